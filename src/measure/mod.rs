@@ -1,0 +1,3 @@
+//! Numbers drawn from a mask or a solution, as plain records.
+
+pub mod row;

@@ -1,0 +1,48 @@
+//! Owns the record of one solve: a row of `results.csv`. Missing values are `None` here and `NA` in the file.
+
+use serde::{Deserialize, Serialize};
+
+/// One row of `results.csv`, its columns in the order of the fields.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+pub struct Row {
+    pub scan: String,
+    /// `lattice` or `voxel-fe`.
+    pub method: String,
+    /// `sc`, `bcc`, `fcc` or `hex8`.
+    pub structure: String,
+    /// `firm`, `floppy`, `graded`, `ffb`, `extrapolated`; None for voxel FE.
+    pub boundary: Option<String>,
+    /// Lattice parameter, or element size for voxel FE.
+    pub lp_mm: f64,
+    /// Offset of the lattice, `x;y;z` in mm.
+    pub registration: Option<String>,
+    /// Voxel edge; `x;y;z` where they differ.
+    pub voxel_mm: String,
+    pub young_mpa: f64,
+    pub poisson: f64,
+    pub load: String,
+    pub ends: String,
+    pub axis: String,
+    pub strain: f64,
+    /// 0 for end planes.
+    pub grip_mm: f64,
+    pub tv_definition: String,
+    pub tv_mm3: f64,
+    pub bv_tv: f64,
+    pub sites: Option<u64>,
+    pub dropped_sites: Option<u64>,
+    pub unknowns: Option<u64>,
+    pub iterations: Option<u64>,
+    pub residual: Option<f64>,
+    pub converged: Option<bool>,
+    /// The headline: energy for floppy, graded and voxel FE; stress of the fully coordinated sites for firm.
+    pub e_app_mpa: Option<f64>,
+    pub e_app_reaction_mpa: Option<f64>,
+    pub e_app_stress_mpa: Option<f64>,
+    pub algebraic_error_mpa: Option<f64>,
+    pub discretization_error_mpa: Option<f64>,
+    pub wall_s: Option<f64>,
+    pub peak_mib: Option<f64>,
+    /// What a reader must know of this row (no path between the faces, not converged, ...).
+    pub note: Option<String>,
+}

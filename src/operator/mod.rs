@@ -1,0 +1,12 @@
+//! The seam: what a solver may know of a model, and nothing else.
+//!
+//! `D` is the number of unknowns per site: 1 for conduction, 2 and 3 for displacements, 3 in the plane with rotation.
+
+/// A symmetric positive semi-definite linear operator on `sites() × D` unknowns.
+pub trait Operator<const D: usize>: Sync {
+    fn sites(&self) -> usize;
+    /// `y = A x`. Both of length `sites()`.
+    fn apply(&self, x: &[[f64; D]], y: &mut [[f64; D]]);
+    /// The diagonal of `A`.
+    fn diagonal(&self, d: &mut [[f64; D]]);
+}

@@ -1,0 +1,1 @@
+//! Owns the recipe file: all stages parameters.

@@ -1,0 +1,69 @@
+//! Owns values on a grid, and the segmented specimen that the later stages work on.
+
+use crate::grid::{Axis, Grid};
+use ndarray::Array3;
+
+/// Values on a voxel grid. `values` has shape `(nz, ny, nx)` in standard layout: x is fastest.
+#[derive(Debug, Clone)]
+pub struct Volume<T> {
+    pub grid: Grid,
+    pub values: Array3<T>,
+    /// Rows of the voxel-to-world affine (mm) where the file gave one; None: axes as stored, origin at zero.
+    pub affine: Option<[[f64; 4]; 3]>,
+}
+
+impl<T> Volume<T> {
+    /// # Panics
+    /// If `values` does not have the grid's length (a bug in the caller, not bad input).
+    pub fn from_vec(grid: Grid, values: Vec<T>) -> Self {
+        let [nx, ny, nz] = grid.n;
+        let values = Array3::from_shape_vec((nz, ny, nx), values)
+            .expect("as many values as the grid has voxels");
+        Volume {
+            grid,
+            values,
+            affine: None,
+        }
+    }
+
+    /// All values, x fastest.
+    pub fn as_slice(&self) -> &[T] {
+        self.values
+            .as_slice()
+            .expect("volumes are kept in standard layout")
+    }
+}
+
+/// A segmented scan: which voxels are bone, and of what total volume.
+#[derive(Debug, Clone)]
+pub struct Specimen {
+    pub name: String,
+    /// 1 where bone, 0 elsewhere.
+    pub bone: Volume<u8>,
+    /// Volume of interest in mm³, pores included (a cylinder's π d²/4 · L, not its bounding box).
+    pub tv_mm3: f64,
+    /// How TV was defined, in words ("box", "cylinder d=10 mm", "mask FILE").
+    pub tv_definition: String,
+}
+
+impl Specimen {
+    /// Length of the specimen along `axis` in mm.
+    pub fn length_mm(&self, axis: Axis) -> f64 {
+        self.bone.grid.size_mm()[axis.index()]
+    }
+
+    /// Cross-section of the volume of interest in mm², pores included: TV / L.
+    pub fn area_mm2(&self, axis: Axis) -> f64 {
+        self.tv_mm3 / self.length_mm(axis)
+    }
+
+    /// Bone volume in mm³.
+    pub fn bv_mm3(&self) -> f64 {
+        let voxels = self.bone.as_slice().iter().filter(|&&b| b != 0).count();
+        voxels as f64 * self.bone.grid.voxel_mm3()
+    }
+
+    pub fn bv_tv(&self) -> f64 {
+        self.bv_mm3() / self.tv_mm3
+    }
+}

@@ -1,3 +1,24 @@
-//! The program: words in, exit code out.
+//! The program: words in, exit code out. 0 done; 1 not converged, or some scans failed; 2 usage or unreadable input.
 
-fn main() {}
+mod cli;
+
+use bonepd_ct::run::Outcome;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match cli::run() {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::NotConverged) => {
+            eprintln!("not converged: results are written, the rows are marked");
+            ExitCode::from(1)
+        }
+        Ok(Outcome::SomeFailed(scans)) => {
+            eprintln!("failed: {}", scans.join(", "));
+            ExitCode::from(1)
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}

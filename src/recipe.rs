@@ -1,1 +1,135 @@
-//! Owns the recipe file: all stages parameters.
+//! Owns the recipe file: all stages' settings in TOML, unknown keys refused with the nearest known one named.
+
+use crate::error::{Error, Result};
+use crate::stage::lattice::LatticeParams;
+use crate::stage::report::ReportParams;
+use crate::stage::segment::SegmentParams;
+use crate::stage::solve::SolveParams;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::Path;
+
+/// Settings of a whole run. What a file leaves out takes its default.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Recipe {
+    pub segment: SegmentParams,
+    pub lattice: LatticeParams,
+    pub solve: SolveParams,
+    pub report: ReportParams,
+}
+
+impl Recipe {
+    /// Reads a recipe file.
+    pub fn read(path: &Path) -> Result<Recipe> {
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            Error::file(
+                path,
+                format!("expected a recipe, could not read it: {e}"),
+                "name a TOML file with tables [segment], [lattice], [solve], [report]; `pipelines/` has examples",
+            )
+        })?;
+        Recipe::parse(&text, path)
+    }
+
+    /// `path` only words the errors.
+    pub fn parse(text: &str, path: &Path) -> Result<Recipe> {
+        let table: toml::Table = text.parse().map_err(|e| not_toml(path, &e))?;
+        let known = serde_json::to_value(Recipe::default()).expect("settings are plain data");
+        refuse_unknown(&table, &known, "", path)?;
+        let recipe: Recipe = toml::from_str(text).map_err(|e| not_toml(path, &e))?;
+        recipe.check()?;
+        Ok(recipe)
+    }
+
+    /// Refuses values no stage can use.
+    pub fn check(&self) -> Result<()> {
+        self.segment.check()?;
+        self.lattice.check()?;
+        self.solve.check()
+    }
+}
+
+fn not_toml(path: &Path, e: &toml::de::Error) -> Error {
+    Error::file(
+        path,
+        format!("not a valid recipe\n{e}"),
+        "correct the line shown; `pipelines/paper.toml` shows every key",
+    )
+}
+
+/// Checks the tables' keys against those of the default recipe.
+fn refuse_unknown(table: &toml::Table, known: &Value, prefix: &str, path: &Path) -> Result<()> {
+    for (key, value) in table {
+        let name = format!("{prefix}{key}");
+        match (known.get(key), value) {
+            (None, _) => return Err(unknown_key(&name, key, known, path)),
+            (Some(inner @ Value::Object(_)), toml::Value::Table(sub)) => {
+                refuse_unknown(sub, inner, &format!("{name}."), path)?;
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn unknown_key(name: &str, key: &str, known: &Value, path: &Path) -> Error {
+    let keys: Vec<&str> = known
+        .as_object()
+        .map(|o| o.keys().map(String::as_str).collect())
+        .unwrap_or_default();
+    let nearest = keys
+        .iter()
+        .max_by(|a, b| strsim::jaro_winkler(key, a).total_cmp(&strsim::jaro_winkler(key, b)));
+    let advice = match nearest {
+        Some(best) => format!("did you mean `{best}`? Known here: {}", keys.join(", ")),
+        None => "remove it".to_owned(),
+    };
+    Error::setting(name, format!("unknown key in {}", path.display()), advice)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Recipe> {
+        Recipe::parse(text, Path::new("test.toml"))
+    }
+
+    #[test]
+    fn an_empty_recipe_is_the_defaults() {
+        assert_eq!(parse("").unwrap(), Recipe::default());
+    }
+
+    #[test]
+    fn an_unknown_key_names_the_nearest() {
+        let words = parse("[lattice]\nlpmm = [0.1]").unwrap_err().to_string();
+        assert!(words.contains("lattice.lpmm"), "{words}");
+        assert!(words.contains("did you mean `lp_mm`"), "{words}");
+        let words = parse("[solver]\n").unwrap_err().to_string();
+        assert!(words.contains("did you mean `solve`"), "{words}");
+    }
+
+    #[test]
+    fn a_value_of_the_wrong_type_names_its_line() {
+        let words = parse("[solve]\npoisson = \"soft\"")
+            .unwrap_err()
+            .to_string();
+        assert!(words.contains("poisson"), "{words}");
+        assert!(words.contains("line 2"), "{words}");
+    }
+
+    #[test]
+    fn a_value_no_stage_can_use_is_refused() {
+        let words = parse("[solve]\npoisson = 0.5").unwrap_err().to_string();
+        assert!(words.contains("poisson"), "{words}");
+    }
+
+    #[test]
+    fn a_recipe_survives_writing() {
+        let mut recipe = Recipe::default();
+        recipe.segment.crop = Some([[1, 2], [3, 4], [5, 6]]);
+        let text = toml::to_string(&recipe).unwrap();
+        assert_eq!(parse(&text).unwrap(), recipe);
+    }
+}

@@ -1,1 +1,3 @@
 //! One test program. Each module is one subject.
+
+mod cli;

@@ -1,1 +1,32 @@
-//! See the table in the crate's root.
+//! Recipes on real scans: each verb of the program is one function here, from paths and settings to files.
+
+pub mod cohort;
+pub mod info;
+pub mod lattice;
+pub mod phantom;
+pub mod report;
+pub mod scene;
+pub mod segment;
+pub mod session;
+pub mod solve;
+
+use crate::error::Error;
+
+/// How a command ended when nothing stopped it. Everything else is an [`Error`] (exit 2).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Outcome {
+    Done,
+    /// Results are written, their rows marked.
+    NotConverged,
+    /// Names of the scans that failed; the others are done.
+    SomeFailed(Vec<String>),
+}
+
+/// For what the command line knows and this version cannot do yet.
+pub(crate) fn not_available(what: &str) -> Error {
+    Error::setting(
+        what,
+        "not available in this version",
+        "see `bonepd-ct --help` for what is",
+    )
+}

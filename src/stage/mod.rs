@@ -1,5 +1,6 @@
 //! One step of the pipeline per file: parameters in, plain result out. No files, no clock, no printing.
 
 pub mod lattice;
+pub mod report;
 pub mod segment;
 pub mod solve;

@@ -1,5 +1,6 @@
 //! Owns segmentation: crop, smooth, threshold, volume of interest, connectivity, in that order.
 
+use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -37,4 +38,57 @@ pub struct SegmentParams {
     pub crop: Option<[[usize; 2]; 3]>,
     /// Keep every voxel, not only the largest 6-connected component.
     pub keep_all: bool,
+}
+
+impl SegmentParams {
+    /// Refuses settings that contradict each other or cannot be used on any scan.
+    pub fn check(&self) -> Result<()> {
+        let refuse =
+            |key: &str, found: String, advice: &str| Err(Error::setting(key, found, advice));
+        if self.otsu && (self.lower.is_some() || self.upper.is_some()) {
+            return refuse(
+                "segment.otsu",
+                "Otsu's threshold and a window (lower, upper) exclude each other".to_owned(),
+                "give one of them",
+            );
+        }
+        if let (Some(lower), Some(upper)) = (self.lower, self.upper)
+            && lower > upper
+        {
+            return refuse(
+                "segment.lower",
+                format!("lower {lower} lies above upper {upper}, so nothing is bone"),
+                "swap them",
+            );
+        }
+        if !(self.gaussian_voxels >= 0.0 && self.gaussian_voxels.is_finite()) {
+            return refuse(
+                "segment.gaussian_voxels",
+                format!(
+                    "expected a width of 0 or more voxels, found {}",
+                    self.gaussian_voxels
+                ),
+                "0 is off; 0.5 to 1.2 is usual",
+            );
+        }
+        if let Some(spacing) = self.spacing_mm
+            && spacing.iter().any(|h| !(*h > 0.0 && h.is_finite()))
+        {
+            return refuse(
+                "segment.spacing_mm",
+                format!("expected voxel sizes in mm above 0, found {spacing:?}"),
+                "give one number, or one per axis",
+            );
+        }
+        if let Some(crop) = self.crop
+            && let Some([first, end]) = crop.iter().find(|[first, end]| first >= end)
+        {
+            return refuse(
+                "segment.crop",
+                format!("expected first < end, found {first}:{end}"),
+                "the end is not included: 0:100 keeps 100 voxels",
+            );
+        }
+        Ok(())
+    }
 }

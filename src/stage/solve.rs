@@ -1,5 +1,6 @@
 //! Owns the solve stage's settings: material, load, supports, accuracy.
 
+use crate::error::{Error, Result};
 use crate::grid::Axis;
 use serde::{Deserialize, Serialize};
 
@@ -64,5 +65,60 @@ impl Default for SolveParams {
             tolerance: 1e-3,
             max_iterations: 200_000,
         }
+    }
+}
+
+impl SolveParams {
+    /// Refuses what is no elastic material, no load or no accuracy.
+    pub fn check(&self) -> Result<()> {
+        let rules = [
+            (
+                "solve.young_mpa",
+                self.young_mpa,
+                self.young_mpa > 0.0,
+                "a modulus in MPa above 0 (the paper: 1000)",
+            ),
+            (
+                "solve.poisson",
+                self.poisson,
+                self.poisson > -1.0 && self.poisson < 0.5,
+                "a ratio above -1 and below 0.5 (bone: 0.3; at 0.5 the material is incompressible and has no stiffness matrix)",
+            ),
+            (
+                "solve.strain",
+                self.strain,
+                self.strain != 0.0,
+                "a strain other than 0; negative is compression (the paper: -0.0042)",
+            ),
+            (
+                "solve.grip_mm",
+                self.grip_mm,
+                self.grip_mm >= 0.0,
+                "a thickness in mm; 0 grips the end planes (the paper: 0.6)",
+            ),
+            (
+                "solve.tolerance",
+                self.tolerance,
+                self.tolerance > 0.0 && self.tolerance < 1.0,
+                "a relative error between 0 and 1 (0.001 is 0.1 %)",
+            ),
+        ];
+        for (key, value, ok, expected) in rules {
+            if !ok || !value.is_finite() {
+                return Err(Error::setting(
+                    key,
+                    format!("not usable: {value}"),
+                    format!("give {expected}"),
+                ));
+            }
+        }
+        if self.max_iterations == 0 {
+            return Err(Error::setting(
+                "solve.max_iterations",
+                "0 iterations solve nothing",
+                "give 1 or more",
+            ));
+        }
+        Ok(())
     }
 }

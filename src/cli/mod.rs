@@ -1,0 +1,125 @@
+//! The command line: one file per verb. Words become validated plain data here; the library does the rest.
+
+mod completions;
+mod info;
+mod lattice;
+mod phantom;
+mod report;
+mod run;
+mod scene;
+mod segment;
+mod solve;
+mod words;
+
+use bonepd_ct::error::{Error, Result};
+use bonepd_ct::run::Outcome;
+use bonepd_ct::run::session::Session;
+use clap::{Args, Parser, Subcommand};
+use serde::Serialize;
+
+/// From a μCT scan of trabecular bone to its apparent stiffness, with a stated error.
+///
+/// A scan goes through four steps, each a command of its own: `segment` finds the bone, `lattice` lays lattices over it,
+/// `solve` compresses them and yields the apparent modulus E_app, `report` turns the results of many scans into tables and
+/// figures. `run` does all four from a recipe file, on one scan or on a folder of scans.
+#[derive(Parser)]
+#[command(name = "bonepd-ct", version, after_help = EXAMPLES, max_term_width = 110)]
+pub struct Cli {
+    #[command(flatten)]
+    shared: Shared,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  bonepd-ct run pipelines/quick.toml scan.nii.gz -o out
+  bonepd-ct segment slices/ -o out --spacing 0.0195 --gaussian 1 --lower 63
+  bonepd-ct solve out --young-mpa 1000 --poisson 0.3
+  bonepd-ct report out -o out/report
+
+Exit code: 0 done; 1 not converged, or some scans failed (results written, marked); 2 usage or unreadable input.
+Units: mm, N, MPa, s. A negative strain is compression.";
+
+/// Flags of every command.
+#[derive(Args)]
+struct Shared {
+    /// Threads to compute with [default: one per core]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), help_heading = "Shared")]
+    threads: Option<u16>,
+    /// Only warnings and errors on stderr
+    #[arg(long, global = true, help_heading = "Shared")]
+    quiet: bool,
+    /// More detail on stderr
+    #[arg(
+        short,
+        long,
+        global = true,
+        conflicts_with = "quiet",
+        help_heading = "Shared"
+    )]
+    verbose: bool,
+    /// Print the result as JSON on stdout
+    #[arg(long, global = true, help_heading = "Shared")]
+    json: bool,
+    /// Check the input and say what would be done; write nothing
+    #[arg(long, global = true, help_heading = "Shared")]
+    dry_run: bool,
+    /// Redo what is up to date
+    #[arg(long, global = true, help_heading = "Shared")]
+    force: bool,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Segment(segment::SegmentArgs),
+    Lattice(lattice::LatticeArgs),
+    Solve(solve::SolveArgs),
+    Report(report::ReportArgs),
+    Run(run::RunArgs),
+    Phantom(phantom::PhantomArgs),
+    Info(info::InfoArgs),
+    Scene(scene::SceneArgs),
+    Completions(completions::CompletionsArgs),
+}
+
+/// Parses the words and carries out the command. Bad usage ends the process here with clap's message and exit code 2.
+pub fn run() -> Result<Outcome> {
+    let cli = Cli::parse();
+    let session = session(&cli.shared)?;
+    let json = cli.shared.json;
+    match &cli.verb {
+        Verb::Segment(args) => segment::run(args, &session, json),
+        Verb::Lattice(args) => lattice::run(args, &session, json),
+        Verb::Solve(args) => solve::run(args, &session, json),
+        Verb::Report(args) => report::run(args, &session, json),
+        Verb::Run(args) => run::run(args, &session, json),
+        Verb::Phantom(args) => phantom::run(args, &session),
+        Verb::Info(args) => info::run(args, json),
+        Verb::Scene(args) => scene::run(args, &session),
+        Verb::Completions(args) => completions::run(args),
+    }
+}
+
+fn session(shared: &Shared) -> Result<Session> {
+    if let Some(n) = shared.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(n.into())
+            .build_global()
+            .map_err(|e| Error::setting("--threads", e.to_string(), "ask for fewer"))?;
+    }
+    Ok(Session {
+        threads: shared.threads.map(usize::from),
+        quiet: shared.quiet,
+        verbose: shared.verbose,
+        dry_run: shared.dry_run,
+        force: shared.force,
+    })
+}
+
+/// The result on stdout. A closed pipe is the reader's choice, not an error.
+fn print_json(result: &impl Serialize) {
+    use std::io::Write;
+    let text = serde_json::to_string_pretty(result).expect("results are plain data");
+    let _ = writeln!(std::io::stdout(), "{text}");
+}

@@ -1,0 +1,88 @@
+//! `segment`: which voxels are bone.
+
+use super::{print_json, words};
+use bonepd_ct::error::Result;
+use bonepd_ct::run::Outcome;
+use bonepd_ct::run::session::Session;
+use bonepd_ct::stage::segment::{SegmentParams, Voi};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Find the bone in a scan: crop, smooth, threshold, volume of interest, largest connected piece
+///
+/// Writes DIR/mask.nii.gz (1 where bone), DIR/segment.json (what is needed to repeat it, BV, TV, BV/TV) and
+/// DIR/segment.png (mid-slices with the mask's outline).
+#[derive(Args)]
+pub struct SegmentArgs {
+    /// The scan: a file (.nii, .nii.gz, .tif, ...) or a folder of slices
+    input: PathBuf,
+    /// Folder for the results
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    settings: SegmentSettings,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Segmentation")]
+pub struct SegmentSettings {
+    /// Voxel size in mm, one number or one per axis; overrides the file's
+    #[arg(long, value_name = "MM[,MM,MM]", value_parser = words::sizes)]
+    spacing: Option<[f64; 3]>,
+    /// Bone is this value or more, in the image's own units, after smoothing
+    #[arg(long, value_name = "V", value_parser = words::number, allow_negative_numbers = true)]
+    lower: Option<f64>,
+    /// Bone is this value or less
+    #[arg(long, value_name = "V", value_parser = words::number, allow_negative_numbers = true)]
+    upper: Option<f64>,
+    /// Otsu's threshold instead of a window
+    #[arg(long, conflicts_with_all = ["lower", "upper"])]
+    otsu: bool,
+    /// Smooth with a Gaussian of this σ in voxels before the threshold [default: off]
+    #[arg(long, value_name = "VOXELS", value_parser = words::number)]
+    gaussian: Option<f64>,
+    /// Volume of interest: box, cylinder (the largest that fits), cylinder:D or cylinder:D,X,Y in mm, or a mask file
+    /// on the scan's grid [default: box]
+    #[arg(long, value_name = "VOI", value_parser = words::voi)]
+    voi: Option<Voi>,
+    /// Keep voxels first:end along each axis; the end is not included
+    #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = words::crop)]
+    crop: Option<[[usize; 2]; 3]>,
+    /// Keep every voxel, not only the largest connected piece
+    #[arg(long)]
+    keep_all: bool,
+}
+
+impl SegmentSettings {
+    /// What was said here wins over `params`.
+    pub fn apply(&self, params: &mut SegmentParams) -> Result<()> {
+        if self.otsu {
+            (params.otsu, params.lower, params.upper) = (true, None, None);
+        }
+        if self.lower.is_some() || self.upper.is_some() {
+            params.otsu = false;
+        }
+        params.spacing_mm = self.spacing.or(params.spacing_mm);
+        params.lower = self.lower.or(params.lower);
+        params.upper = self.upper.or(params.upper);
+        params.crop = self.crop.or(params.crop);
+        params.keep_all |= self.keep_all;
+        if let Some(sigma) = self.gaussian {
+            params.gaussian_voxels = sigma;
+        }
+        if let Some(voi) = &self.voi {
+            params.voi = voi.clone();
+        }
+        params.check()
+    }
+}
+
+pub fn run(args: &SegmentArgs, session: &Session, json: bool) -> Result<Outcome> {
+    let mut params = SegmentParams::default();
+    args.settings.apply(&mut params)?;
+    let summary = bonepd_ct::run::segment::segment(&args.input, &args.out, &params, session)?;
+    if json {
+        print_json(&summary);
+    }
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,119 @@
+//! `solve`: the apparent modulus.
+
+use super::lattice::LatticeSettings;
+use super::{print_json, words};
+use bonepd_ct::error::{Error, Result};
+use bonepd_ct::grid::Axis;
+use bonepd_ct::run::Outcome;
+use bonepd_ct::run::session::Session;
+use bonepd_ct::stage::solve::{Ends, Load, Method, SolveParams};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Load a segmented scan and yield its apparent modulus E_app
+///
+/// Solves every lattice asked for here or by `lattice` before, and writes DIR/results.csv (one row per solve) and
+/// DIR/results.json (the same with provenance) after each.
+#[derive(Args)]
+pub struct SolveArgs {
+    /// Folder of a segmented scan
+    dir: PathBuf,
+    #[command(flatten)]
+    settings: SolveSettings,
+    #[command(flatten)]
+    lattice: LatticeSettings,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Solve")]
+pub struct SolveSettings {
+    /// lattice (the lattice element method), or voxel-fe (one hexahedron per bone voxel) [default: lattice]
+    #[arg(long, value_parser = words::choice::<Method>(&["lattice", "voxel-fe"]))]
+    method: Option<Method>,
+    /// Young's modulus of the bone tissue in MPa [default: 1000]
+    #[arg(long, value_name = "E", value_parser = words::positive)]
+    young_mpa: Option<f64>,
+    /// Poisson's ratio of the bone tissue, below 0.5 [default: 0.3]
+    #[arg(long, value_name = "NU", value_parser = words::number, allow_negative_numbers = true)]
+    poisson: Option<f64>,
+    /// Nominal strain; negative is compression [default: -0.01]
+    #[arg(long, value_name = "S", value_parser = words::number, allow_negative_numbers = true)]
+    strain: Option<f64>,
+    /// Thickness of each grip in mm; 0 grips the end planes [default: 0]
+    #[arg(long, value_name = "MM", value_parser = words::number)]
+    grip_mm: Option<f64>,
+    /// uniaxial, confined (sides held), or stiffness (all six unit strains) [default: uniaxial]
+    #[arg(long, value_parser = words::choice::<Load>(&["uniaxial", "confined", "stiffness"]))]
+    load: Option<Load>,
+    /// Whether the gripped ends may slide sideways: free, or bonded [default: free]
+    #[arg(long, value_parser = words::choice::<Ends>(&["free", "bonded"]))]
+    ends: Option<Ends>,
+    /// Load axis [default: z]
+    #[arg(long, value_parser = words::choice::<Axis>(&["x", "y", "z"]))]
+    axis: Option<Axis>,
+    /// Algebraic error allowed in the modulus, as 0.1% or 0.001 [default: 0.1%]
+    #[arg(long, value_name = "ERROR", value_parser = words::fraction)]
+    tolerance: Option<f64>,
+    /// Choose the resolution so that the whole error stays below this, as 3% or 0.03
+    #[arg(long, value_name = "ERROR", value_parser = words::fraction)]
+    error: Option<f64>,
+    /// voxel-fe: split each voxel into N³ elements
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "coarsen")]
+    refine: Option<u16>,
+    /// voxel-fe: one element per N³ voxels
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    coarsen: Option<u16>,
+    /// Fields to write, comma-separated (displacement, energy-density, ...) [default: none]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    fields: Vec<String>,
+}
+
+impl SolveSettings {
+    /// What was said here wins over `params`.
+    pub fn apply(&self, params: &mut SolveParams) -> Result<()> {
+        params.method = self.method.unwrap_or(params.method);
+        params.young_mpa = self.young_mpa.unwrap_or(params.young_mpa);
+        params.poisson = self.poisson.unwrap_or(params.poisson);
+        params.strain = self.strain.unwrap_or(params.strain);
+        params.grip_mm = self.grip_mm.unwrap_or(params.grip_mm);
+        params.load = self.load.unwrap_or(params.load);
+        params.ends = self.ends.unwrap_or(params.ends);
+        params.axis = self.axis.unwrap_or(params.axis);
+        params.tolerance = self.tolerance.unwrap_or(params.tolerance);
+        self.refuse_unavailable()?;
+        params.check()
+    }
+
+    fn refuse_unavailable(&self) -> Result<()> {
+        for (flag, asked) in [
+            ("--error", self.error.is_some()),
+            ("--refine", self.refine.is_some()),
+            ("--coarsen", self.coarsen.is_some()),
+            ("--fields", !self.fields.is_empty()),
+        ] {
+            if asked {
+                return Err(Error::setting(
+                    flag,
+                    "not available in this version",
+                    "leave it out",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
+    let mut params = SolveParams::default();
+    args.settings.apply(&mut params)?;
+    let mut lattice = bonepd_ct::run::lattice::settings(&args.dir)?;
+    args.lattice.apply(&mut lattice)?;
+    let rows = bonepd_ct::run::solve::solve(&args.dir, &lattice, &params, session)?;
+    if json {
+        print_json(&rows);
+    }
+    Ok(match rows.iter().any(|row| row.converged == Some(false)) {
+        true => Outcome::NotConverged,
+        false => Outcome::Done,
+    })
+}

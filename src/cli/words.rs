@@ -1,0 +1,166 @@
+//! Owns the words of the command line: lists, percentages, crops, choices; from text to plain values.
+
+use bonepd_ct::stage::segment::Voi;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use serde::de::DeserializeOwned;
+use serde::de::value::{Error as WordError, StrDeserializer};
+
+/// One of `names`, each the serde name of a variant of `T`.
+pub fn choice<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: DeserializeOwned + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(names).try_map(|word| {
+        let word: StrDeserializer<WordError> = StrDeserializer::new(&word);
+        T::deserialize(word)
+    })
+}
+
+/// A finite number.
+pub fn number(word: &str) -> Result<f64, String> {
+    match word.trim().parse::<f64>() {
+        Ok(v) if v.is_finite() => Ok(v),
+        _ => Err(format!("expected a number, found `{word}`")),
+    }
+}
+
+/// A number above zero.
+pub fn positive(word: &str) -> Result<f64, String> {
+    number(word).and_then(|v| match v > 0.0 {
+        true => Ok(v),
+        false => Err(format!("expected a number above 0, found `{word}`")),
+    })
+}
+
+/// `0.1%` or `0.001`, as a fraction.
+pub fn fraction(word: &str) -> Result<f64, String> {
+    match word.trim().strip_suffix('%') {
+        Some(percent) => positive(percent).map(|v| v / 100.0),
+        None => positive(word),
+    }
+}
+
+/// `X,Y,Z`.
+pub fn triple(word: &str) -> Result<[f64; 3], String> {
+    let parts: Vec<f64> = word.split(',').map(number).collect::<Result<_, _>>()?;
+    parts
+        .try_into()
+        .map_err(|_| format!("expected three numbers X,Y,Z, found `{word}`"))
+}
+
+/// `H` or `X,Y,Z`, all above zero.
+pub fn sizes(word: &str) -> Result<[f64; 3], String> {
+    let sizes = match word.contains(',') {
+        true => triple(word)?,
+        false => [number(word)?; 3],
+    };
+    match sizes.iter().all(|s| *s > 0.0) {
+        true => Ok(sizes),
+        false => Err(format!("expected lengths above 0, found `{word}`")),
+    }
+}
+
+/// `X0:X1,Y0:Y1,Z0:Z1` in voxels; the ends are not included.
+pub fn crop(word: &str) -> Result<[[usize; 2]; 3], String> {
+    let ranges: Vec<[usize; 2]> = word.split(',').map(range).collect::<Result<_, _>>()?;
+    ranges
+        .try_into()
+        .map_err(|_| format!("expected three ranges X0:X1,Y0:Y1,Z0:Z1, found `{word}`"))
+}
+
+fn range(word: &str) -> Result<[usize; 2], String> {
+    let wrong = || format!("expected first:end in voxels with first < end, found `{word}`");
+    let (first, end) = word.split_once(':').ok_or_else(wrong)?;
+    let first = first.trim().parse().map_err(|_| wrong())?;
+    let end = end.trim().parse().map_err(|_| wrong())?;
+    if first < end {
+        Ok([first, end])
+    } else {
+        Err(wrong())
+    }
+}
+
+/// `box`, `cylinder`, `cylinder:D`, `cylinder:D,X,Y` (mm), or a mask file.
+pub fn voi(word: &str) -> Result<Voi, String> {
+    if word == "box" {
+        return Ok(Voi::Box);
+    }
+    let cylinder = |diameter_mm, center_mm| Voi::Cylinder {
+        diameter_mm,
+        center_mm,
+    };
+    match word.strip_prefix("cylinder") {
+        Some("") => Ok(cylinder(None, None)),
+        Some(rest) if rest.starts_with(':') => {
+            let parts: Vec<f64> = rest[1..].split(',').map(number).collect::<Result<_, _>>()?;
+            match parts[..] {
+                [d] if d > 0.0 => Ok(cylinder(Some(d), None)),
+                [d, x, y] if d > 0.0 => Ok(cylinder(Some(d), Some([x, y]))),
+                _ => Err(format!(
+                    "expected cylinder:DIAMETER or cylinder:DIAMETER,X,Y in mm, found `{word}`"
+                )),
+            }
+        }
+        _ => Ok(Voi::Mask(word.into())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bonepd_ct::stage::lattice::Structure;
+
+    #[test]
+    fn a_percentage_is_a_fraction() {
+        assert_eq!(fraction("0.5%"), Ok(0.005));
+        assert_eq!(fraction("0.001"), Ok(0.001));
+        assert!(fraction("-1%").is_err());
+        assert!(fraction("x").is_err());
+    }
+
+    #[test]
+    fn one_size_serves_all_axes() {
+        assert_eq!(sizes("0.02"), Ok([0.02; 3]));
+        assert_eq!(sizes("0.1, 0.2,0.3"), Ok([0.1, 0.2, 0.3]));
+        assert!(sizes("0.1,0.2").is_err());
+        assert!(sizes("0").is_err());
+        assert!(sizes("nan").is_err());
+    }
+
+    #[test]
+    fn a_crop_is_three_ranges() {
+        assert_eq!(crop("0:10,5:6,2:200"), Ok([[0, 10], [5, 6], [2, 200]]));
+        for bad in ["0:10", "0:10,5:5,0:1", "a:1,0:1,0:1", "0-1,0-1,0-1", ""] {
+            assert!(crop(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_volume_of_interest_is_a_shape_or_a_file() {
+        assert_eq!(voi("box"), Ok(Voi::Box));
+        let shape = |diameter_mm, center_mm| {
+            Ok(Voi::Cylinder {
+                diameter_mm,
+                center_mm,
+            })
+        };
+        assert_eq!(voi("cylinder"), shape(None, None));
+        assert_eq!(voi("cylinder:5"), shape(Some(5.0), None));
+        assert_eq!(voi("cylinder:5,1,2"), shape(Some(5.0), Some([1.0, 2.0])));
+        assert_eq!(voi("voi.nii.gz"), Ok(Voi::Mask("voi.nii.gz".into())));
+        assert!(voi("cylinder:0").is_err());
+    }
+
+    #[test]
+    fn a_choice_is_a_variant_by_its_recipe_name() {
+        let command =
+            clap::Command::new("test")
+                .arg(clap::Arg::new("s").value_parser(choice::<Structure>(&["sc", "bcc", "fcc"])));
+        let words = command
+            .clone()
+            .try_get_matches_from(["test", "bcc"])
+            .unwrap();
+        assert_eq!(words.get_one("s"), Some(&Structure::Bcc));
+        assert!(command.try_get_matches_from(["test", "hcp"]).is_err());
+    }
+}

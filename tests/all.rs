@@ -1,3 +1,4 @@
 //! One test program. Each module is one subject.
 
 mod cli;
+mod layers;

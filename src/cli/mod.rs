@@ -76,7 +76,7 @@ enum Verb {
     Lattice(lattice::LatticeArgs),
     Solve(solve::SolveArgs),
     Report(report::ReportArgs),
-    Run(run::RunArgs),
+    Run(Box<run::RunArgs>),
     Phantom(phantom::PhantomArgs),
     Info(info::InfoArgs),
     Scene(scene::SceneArgs),

@@ -1,1 +1,4 @@
-//! See the table in the crate's root.
+//! Files: one format a file.
+
+pub mod atomic;
+pub mod table;

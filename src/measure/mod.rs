@@ -1,3 +1,4 @@
 //! Numbers drawn from a mask or a solution, as plain records.
 
+pub mod ffb;
 pub mod row;

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// One row of `results.csv`, its columns in the order of the fields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(default)]
 pub struct Row {
     pub scan: String,
     /// `lattice` or `voxel-fe`.

@@ -1,0 +1,123 @@
+//! Owns the writing of whole files: a temporary file in the same folder, synced, then renamed. A reader never meets
+//! half a file, and a failed write leaves nothing behind.
+
+use crate::error::{Error, Result};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+/// Writes `path` through `fill`. Folders on the way are created.
+pub fn write_with(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> std::io::Result<()>,
+) -> Result<()> {
+    try_write(path, fill).map_err(|e| unwritable(path, &e))
+}
+
+/// Writes `bytes` to `path`.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+    write_with(path, |out| out.write_all(bytes.as_ref()))
+}
+
+/// Creates a folder and its parents.
+pub fn create_dir(path: &Path) -> Result<()> {
+    std::fs::create_dir_all(path).map_err(|e| unwritable(path, &e))
+}
+
+fn unwritable(path: &Path, e: &std::io::Error) -> Error {
+    Error::file(
+        path,
+        format!("cannot be written: {e}"),
+        "check that the folder exists, is writable and has space left, or choose another output",
+    )
+}
+
+fn try_write(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let dir = match path.parent() {
+        Some(dir) if !dir.as_os_str().is_empty() => dir,
+        _ => Path::new("."),
+    };
+    std::fs::create_dir_all(dir)?;
+    let mut file = tempfile::Builder::new()
+        .prefix(".writing-")
+        .tempfile_in(dir)?;
+    let mut out = BufWriter::with_capacity(1 << 20, file.as_file_mut());
+    fill(&mut out)?;
+    out.flush()?;
+    drop(out);
+    persist(file, path)
+}
+
+/// Syncs a finished temporary file (of the same folder) and gives it its name.
+pub fn keep(file: tempfile::NamedTempFile, path: &Path) -> Result<()> {
+    persist(file, path).map_err(|e| unwritable(path, &e))
+}
+
+fn persist(file: tempfile::NamedTempFile, path: &Path) -> std::io::Result<()> {
+    readable_by_all(file.as_file())?;
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}
+
+/// Temporary files are private (0600); results get what a plain `create` would have given: 0666 less the umask.
+#[cfg(unix)]
+fn readable_by_all(file: &std::fs::File) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    use std::sync::OnceLock;
+    static UMASK: OnceLock<u32> = OnceLock::new();
+    let umask = *UMASK.get_or_init(read_umask);
+    file.set_permissions(std::fs::Permissions::from_mode(0o666 & !umask))
+}
+
+/// The process's umask. Linux tells it in /proc; elsewhere it can only be read by setting it, so the usual 022 is assumed.
+#[cfg(unix)]
+fn read_umask() -> u32 {
+    std::fs::read_to_string("/proc/self/status")
+        .ok()
+        .and_then(|s| {
+            let line = s.lines().find_map(|l| l.strip_prefix("Umask:"))?;
+            u32::from_str_radix(line.trim(), 8).ok()
+        })
+        .unwrap_or(0o022)
+}
+
+#[cfg(not(unix))]
+fn readable_by_all(_: &std::fs::File) -> std::io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_keeps_the_old_file_and_leaves_nothing_behind() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("deep/result.csv");
+        write(&path, "old").unwrap();
+        let failed = write_with(&path, |out| {
+            out.write_all(b"half of the new")?;
+            Err(std::io::Error::other("disk on fire"))
+        });
+        assert!(failed.unwrap_err().to_string().contains("disk on fire"));
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+        let names = std::fs::read_dir(path.parent().unwrap()).unwrap().count();
+        assert_eq!(names, 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn results_are_not_private_to_their_writer() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("r");
+        write(&path, "x").unwrap();
+        let plain = dir.path().join("p");
+        std::fs::write(&plain, "x").unwrap();
+        let mode = |p: &Path| std::fs::metadata(p).unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode(&path), mode(&plain));
+    }
+}

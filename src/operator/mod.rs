@@ -2,6 +2,8 @@
 //!
 //! `D` is the number of unknowns per site: 1 for conduction, 2 and 3 for displacements, 3 in the plane with rotation.
 
+pub mod held;
+
 /// A symmetric positive semi-definite linear operator on `sites() × D` unknowns.
 pub trait Operator<const D: usize>: Sync {
     fn sites(&self) -> usize;
@@ -9,4 +11,9 @@ pub trait Operator<const D: usize>: Sync {
     fn apply(&self, x: &[[f64; D]], y: &mut [[f64; D]]);
     /// The diagonal of `A`.
     fn diagonal(&self, d: &mut [[f64; D]]);
+}
+
+/// An approximate inverse, symmetric and positive definite on the free unknowns: `z ≈ A⁻¹ r`.
+pub trait Preconditioner<const D: usize>: Sync {
+    fn apply(&self, r: &[[f64; D]], z: &mut [[f64; D]]);
 }

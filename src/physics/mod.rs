@@ -1,1 +1,3 @@
-//! See the table in the crate's root.
+//! Energies and the forces that follow from them. No physics imports another, or a solver.
+
+pub mod lattice;

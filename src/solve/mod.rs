@@ -1,1 +1,5 @@
-//! See the table in the crate's root.
+//! Algorithms that see an operator, never the physics behind it.
+
+pub mod cg;
+pub mod estimate;
+pub mod jacobi;

@@ -1,24 +1,13 @@
-//! Owns the lattice stage's settings.
+//! Owns the lattice stage: from a specimen to the sites of one lattice.
 
 use crate::error::{Error, Result};
+use crate::grid::Axis;
+pub use crate::topology::placement::Boundary;
+use crate::topology::placement::{Frame, weigh};
+use crate::topology::sites::{Grips, Sites};
+pub use crate::topology::stencil::Structure;
+use crate::volume::Specimen;
 use serde::{Deserialize, Serialize};
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
-pub enum Structure {
-    #[default]
-    Sc,
-    Bcc,
-    Fcc,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Boundary {
-    Firm,
-    Floppy,
-    Graded,
-}
 
 /// Settings of `lattice`: one lattice per structure × lattice parameter × boundary.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,5 +58,103 @@ impl LatticeParams {
             ));
         }
         Ok(())
+    }
+}
+
+/// One lattice of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Case {
+    pub structure: Structure,
+    pub lp_mm: f64,
+    pub boundary: Boundary,
+    pub registration_mm: [f64; 3],
+}
+
+impl LatticeParams {
+    /// All lattices asked for: structures, then lattice parameters from coarse to fine, then boundaries, floppy before
+    /// firm.
+    pub fn cases(&self) -> Vec<Case> {
+        let mut lps = self.lp_mm.clone();
+        lps.sort_by(|a, b| b.total_cmp(a));
+        let mut cases = Vec::new();
+        for &structure in &self.structure {
+            for &lp_mm in &lps {
+                for boundary in [Boundary::Floppy, Boundary::Graded, Boundary::Firm] {
+                    if self.boundary.contains(&boundary) {
+                        let registration_mm = self.registration_mm;
+                        cases.push(Case {
+                            structure,
+                            lp_mm,
+                            boundary,
+                            registration_mm,
+                        });
+                    }
+                }
+            }
+        }
+        cases
+    }
+}
+
+/// Builds one lattice of a specimen: places sites, joins them, drops what has no path to both grips.
+///
+/// # Errors
+/// A lattice parameter or grip that does not fit the specimen.
+pub fn build(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<Sites> {
+    let grid = &specimen.bone.grid;
+    let frame = Frame::new(
+        grid,
+        case.structure,
+        case.lp_mm,
+        case.boundary,
+        axis,
+        case.registration_mm,
+    )?;
+    let length = specimen.length_mm(axis);
+    let grips = Grips::new(&frame, length, grip_mm).ok_or_else(|| {
+        Error::setting(
+            "grip_mm",
+            format!(
+                "grips of {grip_mm} mm leave nothing free between them: {length:.4} mm long at lp {} mm",
+                case.lp_mm
+            ),
+            "give a thinner grip or a smaller lattice parameter",
+        )
+    })?;
+    let weights = weigh(&frame, &specimen.bone, case.boundary);
+    Ok(Sites::connect(frame, &weights, grips))
+}
+
+/// What a lattice is made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LatticeSummary {
+    pub structure: Structure,
+    pub boundary: Boundary,
+    pub lp_mm: f64,
+    pub sites: usize,
+    pub bonds: usize,
+    pub fully_coordinated_sites: usize,
+    /// Sites without a path of bonds to both grips.
+    pub dropped_sites: usize,
+    /// Volume of the sites' cells (graded: their bone fractions) over TV.
+    pub lattice_bv_tv: f64,
+}
+
+pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSummary {
+    let whole = sites
+        .weights
+        .as_ref()
+        .map_or(sites.len() as f64, |w| w.iter().sum());
+    LatticeSummary {
+        structure: case.structure,
+        boundary: case.boundary,
+        lp_mm: case.lp_mm,
+        sites: sites.len(),
+        bonds: sites.bonds(),
+        fully_coordinated_sites: (0..sites.len())
+            .filter(|&s| sites.fully_coordinated(s))
+            .count(),
+        dropped_sites: sites.dropped,
+        lattice_bv_tv: whole * sites.cell_mm3() / specimen.tv_mm3,
     }
 }

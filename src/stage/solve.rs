@@ -1,7 +1,17 @@
-//! Owns the solve stage's settings: material, load, supports, accuracy.
+//! Owns the solve stage: material, load, supports and accuracy in, apparent moduli out.
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
+use crate::measure::apparent::Loaded;
+use crate::operator::Operator;
+use crate::operator::held::{Constrained, Held};
+use crate::par::sum_chunks;
+use crate::physics::lattice::{self, Lattice};
+use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, minimise};
+use crate::solve::jacobi::Jacobi;
+use crate::stage::lattice::{Boundary, Case, build};
+use crate::topology::sites::Sites;
+use crate::volume::Specimen;
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
@@ -68,6 +78,58 @@ impl Default for SolveParams {
     }
 }
 
+/// A number with the part of it that the solver left undone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moduli {
+    /// The headline (see [`crate::measure::row::Row::e_app_mpa`]).
+    pub e_app_mpa: f64,
+    pub from_energy_mpa: f64,
+    pub from_reaction_mpa: f64,
+    /// Over all sites; for firm over the fully coordinated ones.
+    pub from_stress_mpa: f64,
+    /// Estimated algebraic error of the headline.
+    pub algebraic_error_mpa: f64,
+}
+
+/// A solved model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solved {
+    pub sites: usize,
+    pub dropped: usize,
+    pub unknowns: usize,
+    pub iterations: usize,
+    pub residual: f64,
+    pub ended: Ended,
+    pub moduli: Moduli,
+}
+
+impl Solved {
+    /// The result of a structure that does not connect the faces.
+    fn disconnected(dropped: usize) -> Self {
+        let zero = Moduli {
+            e_app_mpa: 0.0,
+            from_energy_mpa: 0.0,
+            from_reaction_mpa: 0.0,
+            from_stress_mpa: 0.0,
+            algebraic_error_mpa: 0.0,
+        };
+        Solved {
+            sites: 0,
+            dropped,
+            unknowns: 0,
+            iterations: 0,
+            residual: 0.0,
+            ended: Ended::ResidualTolerance,
+            moduli: zero,
+        }
+    }
+
+    /// Whether bone connects the loaded faces.
+    pub fn connected(&self) -> bool {
+        self.sites > 0
+    }
+}
+
 impl SolveParams {
     /// Refuses what is no elastic material, no load or no accuracy.
     pub fn check(&self) -> Result<()> {
@@ -120,5 +182,119 @@ impl SolveParams {
             ));
         }
         Ok(())
+    }
+}
+
+/// Solves one lattice of a specimen.
+///
+/// # Errors
+/// Settings that do not fit the specimen or the lattice.
+pub fn solve_lattice(
+    specimen: &Specimen,
+    case: &Case,
+    params: &SolveParams,
+    observe: impl FnMut(CgStep),
+) -> Result<Solved> {
+    params.check()?;
+    if params.load == Load::Stiffness {
+        return Err(Error::setting(
+            "load",
+            "the apparent stiffness matrix is computed by the voxel-fe method only",
+            "add --method voxel-fe, or use --load uniaxial",
+        ));
+    }
+    let moduli =
+        lattice::Moduli::new(case.structure, case.lp_mm, params.young_mpa, params.poisson)?;
+    let sites = build(specimen, case, params.axis, params.grip_mm)?;
+    if sites.is_empty() {
+        return Ok(Solved::disconnected(sites.dropped));
+    }
+    let model = Lattice::new(&sites, moduli);
+    let loaded = Loaded {
+        gauge_mm: sites.gauge_length_mm(),
+        area_mm2: specimen.area_mm2(params.axis),
+        displacement_mm: params.strain * sites.gauge_length_mm(),
+    };
+    let (held, mut u) = supports(&sites, params, loaded.displacement_mm);
+    let cg = CgParams {
+        // Firm's headline is a linear functional: off to first order in the energy norm, so the energy must be known
+        // to the square of the tolerance.
+        energy_tolerance: match case.boundary {
+            Boundary::Firm => params.tolerance.powi(2),
+            _ => params.tolerance,
+        },
+        max_iterations: params.max_iterations,
+        ..CgParams::default()
+    };
+    let preconditioner = Jacobi::new(&Constrained {
+        inner: &model,
+        held: &held,
+    });
+    let info = minimise(&model, &held, &preconditioner, &mut u, &cg, observe);
+    Ok(Solved {
+        sites: sites.len(),
+        dropped: sites.dropped,
+        unknowns: held.free::<3>(),
+        iterations: info.iterations,
+        residual: info.residual,
+        ended: info.ended,
+        moduli: assess(&model, &sites, case.boundary, &loaded, &u, &info),
+    })
+}
+
+/// Which unknowns are held, and a start that meets them: the field of a homogeneous bar.
+fn supports(sites: &Sites, params: &SolveParams, displacement_mm: f64) -> (Held, Vec<[f64; 3]>) {
+    let axis = params.axis.index();
+    let grips = sites.grips;
+    let mut held = Held::none(sites.len());
+    let mut u = vec![[0.0; 3]; sites.len()];
+    for s in 0..sites.len() {
+        let plane = sites.plane(s);
+        let along = f64::from(plane.clamp(grips.low, grips.high) - grips.low);
+        u[s][axis] = displacement_mm * along / f64::from(grips.high - grips.low);
+        let gripped = grips.holds(plane);
+        for c in 0..3 {
+            let confined = params.load == Load::Confined && c != axis && sites.on_side(s, c);
+            let bonded = gripped && (c == axis || params.ends == Ends::Bonded);
+            if confined || bonded {
+                held.hold(s, c);
+            }
+        }
+    }
+    (held, u)
+}
+
+fn assess(
+    model: &Lattice,
+    sites: &Sites,
+    boundary: Boundary,
+    loaded: &Loaded,
+    u: &[[f64; 3]],
+    info: &CgInfo,
+) -> Moduli {
+    let axis = sites.frame.axis.index();
+    let mut force = vec![[0.0; 3]; sites.len()];
+    model.apply(u, &mut force);
+    let high = |s: &usize| sites.plane(*s) >= sites.grips.high;
+    let reaction: f64 = (0..sites.len()).filter(high).map(|s| force[s][axis]).sum();
+    let firm = boundary == Boundary::Firm;
+    let virial = sum_chunks(sites.len(), |range| {
+        let counted = |s: &usize| !firm || sites.fully_coordinated(*s);
+        range.filter(counted).map(|s| model.site_virial(u, s)).sum()
+    });
+    let from_energy_mpa = loaded.from_energy(info.energy);
+    let from_stress_mpa = loaded.from_virial(virial);
+    let relative = info.energy_error / info.energy;
+    let (e_app_mpa, algebraic_error_mpa) = if firm {
+        (from_stress_mpa, relative.sqrt() * from_stress_mpa.abs())
+    } else {
+        (from_energy_mpa, relative * from_energy_mpa)
+    };
+    Moduli {
+        e_app_mpa,
+        from_energy_mpa,
+        from_reaction_mpa: loaded.from_reaction(reaction),
+        from_stress_mpa,
+        algebraic_error_mpa,
     }
 }

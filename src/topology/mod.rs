@@ -1,1 +1,5 @@
-//! See the table in the crate's root.
+//! Who touches whom, without any moduli: lattice sites, voxel meshes, families of points.
+
+pub mod placement;
+pub mod sites;
+pub mod stencil;

@@ -1,0 +1,211 @@
+//! Owns preconditioned conjugate gradients for `minimise ½ uᵀ A u` under prescribed unknowns.
+
+use crate::operator::held::{Constrained, Held};
+use crate::operator::{Operator, Preconditioner};
+use crate::par::{CHUNK, dot};
+use crate::solve::estimate::EnergyTail;
+use rayon::prelude::*;
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CgParams {
+    /// Estimated relative error of the energy `uᵀAu` at which to stop; 0 never stops by it.
+    pub energy_tolerance: f64,
+    /// `‖r‖ / ‖r₀‖` at which to stop.
+    pub residual_tolerance: f64,
+    pub max_iterations: usize,
+}
+
+impl Default for CgParams {
+    fn default() -> Self {
+        CgParams {
+            energy_tolerance: 1e-3,
+            residual_tolerance: 1e-12,
+            max_iterations: 200_000,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// The estimated energy error met its tolerance.
+    EnergyTolerance,
+    /// The residual met its tolerance.
+    ResidualTolerance,
+    IterationLimit,
+    /// `pᵀAp <= 0` or a value that is not finite: the operator or preconditioner is not positive on the free unknowns.
+    Breakdown,
+}
+
+impl Ended {
+    pub fn converged(self) -> bool {
+        matches!(self, Ended::EnergyTolerance | Ended::ResidualTolerance)
+    }
+}
+
+/// What a solve came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CgInfo {
+    pub ended: Ended,
+    pub iterations: usize,
+    /// True `‖r‖ / ‖r₀‖`, recomputed at the end.
+    pub residual: f64,
+    /// `uᵀAu` of the result.
+    pub energy: f64,
+    /// Estimated excess of `energy` over its minimum.
+    pub energy_error: f64,
+}
+
+/// Progress, told once an iteration.
+#[derive(Debug, Clone, Copy)]
+pub struct CgStep {
+    pub iteration: usize,
+    pub residual: f64,
+    /// Estimated relative energy error, once there is one.
+    pub energy_error: Option<f64>,
+}
+
+/// Minimises `½ uᵀAu` over the unknowns that are not held, starting from (and keeping the held values of) `u`.
+///
+/// The energy is what prescribed displacements minimise, so its error is the squared energy norm of the algebraic
+/// error, which conjugate gradients estimates from its own coefficients ([`EnergyTail`]).
+pub fn minimise<const D: usize>(
+    operator: &impl Operator<D>,
+    held: &Held,
+    preconditioner: &impl Preconditioner<D>,
+    u: &mut [[f64; D]],
+    params: &CgParams,
+    mut observe: impl FnMut(CgStep),
+) -> CgInfo {
+    let n = operator.sites();
+    let constrained = Constrained {
+        inner: operator,
+        held,
+    };
+    let mut r = vec![[0.0; D]; n];
+    operator.apply(u, &mut r);
+    let start_energy = dot(u, &r);
+    held.clear(&mut r);
+    negate(&mut r);
+    let start_norm = dot(&r, &r).sqrt();
+    let mut z = vec![[0.0; D]; n];
+    let mut p = vec![[0.0; D]; n];
+    let mut tail = EnergyTail::default();
+    let mut rz_before = 1.0;
+    let (mut iterations, mut ended) = (0, Ended::IterationLimit);
+    if start_norm == 0.0 {
+        ended = Ended::ResidualTolerance;
+    }
+    while ended == Ended::IterationLimit && iterations < params.max_iterations {
+        preconditioner.apply(&r, &mut z);
+        held.clear(&mut z);
+        let rz = dot(&r, &z);
+        let beta = if iterations == 0 { 0.0 } else { rz / rz_before };
+        combine(&mut p, &z, beta);
+        // z now holds A p.
+        constrained.apply(&p, &mut z);
+        let curvature = dot(&p, &z);
+        if !(curvature > 0.0 && rz > 0.0 && curvature.is_finite() && rz.is_finite()) {
+            ended = Ended::Breakdown;
+            break;
+        }
+        let alpha = rz / curvature;
+        let norm = advance(u, &mut r, &p, &z, alpha).sqrt();
+        rz_before = rz;
+        iterations += 1;
+        tail.push(alpha * rz);
+        let energy = start_energy - tail.total();
+        let error = tail.estimate().map(|e| e / energy);
+        let residual = norm / start_norm;
+        observe(CgStep {
+            iteration: iterations,
+            residual,
+            energy_error: error,
+        });
+        if residual <= params.residual_tolerance {
+            ended = Ended::ResidualTolerance;
+        } else if error.is_some_and(|e| e <= params.energy_tolerance && energy > 0.0) {
+            ended = Ended::EnergyTolerance;
+        }
+    }
+    finish(operator, held, u, &tail, start_norm, iterations, ended)
+}
+
+fn finish<const D: usize>(
+    operator: &impl Operator<D>,
+    held: &Held,
+    u: &[[f64; D]],
+    tail: &EnergyTail,
+    start_norm: f64,
+    iterations: usize,
+    ended: Ended,
+) -> CgInfo {
+    let mut r = vec![[0.0; D]; operator.sites()];
+    operator.apply(u, &mut r);
+    let energy = dot(u, &r);
+    held.clear(&mut r);
+    let residual = if start_norm > 0.0 {
+        dot(&r, &r).sqrt() / start_norm
+    } else {
+        0.0
+    };
+    let energy_error =
+        tail.estimate()
+            .unwrap_or(if start_norm > 0.0 { f64::INFINITY } else { 0.0 });
+    CgInfo {
+        ended,
+        iterations,
+        residual,
+        energy,
+        energy_error,
+    }
+}
+
+fn negate<const D: usize>(r: &mut [[f64; D]]) {
+    r.par_iter_mut()
+        .with_min_len(CHUNK)
+        .for_each(|r| *r = r.map(|v| -v));
+}
+
+/// `p = z + β p`.
+fn combine<const D: usize>(p: &mut [[f64; D]], z: &[[f64; D]], beta: f64) {
+    p.par_iter_mut()
+        .with_min_len(CHUNK)
+        .zip(z)
+        .for_each(|(p, z)| {
+            for c in 0..D {
+                p[c] = z[c] + beta * p[c];
+            }
+        });
+}
+
+/// `u += α p`, `r −= α q`; returns `r·r`, summed chunk by chunk.
+fn advance<const D: usize>(
+    u: &mut [[f64; D]],
+    r: &mut [[f64; D]],
+    p: &[[f64; D]],
+    q: &[[f64; D]],
+    alpha: f64,
+) -> f64 {
+    let chunks = (
+        u.par_chunks_mut(CHUNK),
+        r.par_chunks_mut(CHUNK),
+        p.par_chunks(CHUNK),
+        q.par_chunks(CHUNK),
+    );
+    let parts: Vec<f64> = chunks
+        .into_par_iter()
+        .map(|(u, r, p, q)| {
+            let mut sum = 0.0;
+            for (((u, r), p), q) in u.iter_mut().zip(r).zip(p).zip(q) {
+                for c in 0..D {
+                    u[c] += alpha * p[c];
+                    r[c] -= alpha * q[c];
+                    sum += r[c] * r[c];
+                }
+            }
+            sum
+        })
+        .collect();
+    parts.iter().sum()
+}

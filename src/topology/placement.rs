@@ -1,0 +1,249 @@
+//! Owns where lattice sites sit in a specimen and which of them exist: the floppy, firm and graded rules.
+
+use crate::error::{Error, Result};
+use crate::grid::{Axis, Grid};
+use crate::topology::stencil::Structure;
+use crate::volume::Volume;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Which sites exist, and with what share of their stiffness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Boundary {
+    /// Sites within 1.1 first-neighbour distances of a bone voxel's centre.
+    Firm,
+    /// Sites whose position lies in a bone voxel.
+    Floppy,
+    /// Sites weighted by the bone fraction of their cell.
+    Graded,
+}
+
+impl Boundary {
+    pub fn name(self) -> &'static str {
+        match self {
+            Boundary::Firm => "firm",
+            Boundary::Floppy => "floppy",
+            Boundary::Graded => "graded",
+        }
+    }
+}
+
+/// Cells with less bone than this carry no graded site (lem spec §5).
+const LEAST_FRACTION: f64 = 0.02;
+
+/// Positions of candidate sites: a grid of spacing `step_mm` centred in the volume. Along the load axis the outermost
+/// planes lie on (or within half a step of) the faces; sideways each site owns a whole cell.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    pub structure: Structure,
+    pub axis: Axis,
+    pub lp_mm: f64,
+    pub step_mm: f64,
+    /// Candidates per direction, padding rings included.
+    pub n: [usize; 3],
+    /// Padding rings below the first proper site, per direction.
+    pub rings: [usize; 3],
+    /// Position of the first proper site.
+    pub first_mm: [f64; 3],
+}
+
+impl Frame {
+    /// Lays candidates of `structure` over `grid`.
+    ///
+    /// # Errors
+    /// A lattice parameter that is not positive or leaves fewer than two planes or no site sideways.
+    pub fn new(
+        grid: &Grid,
+        structure: Structure,
+        lp_mm: f64,
+        boundary: Boundary,
+        axis: Axis,
+        registration_mm: [f64; 3],
+    ) -> Result<Self> {
+        if !(lp_mm > 0.0 && lp_mm.is_finite()) {
+            return Err(Error::setting(
+                "lp",
+                format!("{lp_mm} mm is not a length"),
+                "give lattice parameters in mm, such as 0.06,0.08",
+            ));
+        }
+        let step_mm = lp_mm / structure.steps_per_lp();
+        let reach = 1.1 * structure.first_neighbour() * structure.steps_per_lp();
+        let ring = match boundary {
+            Boundary::Firm => reach.ceil() as usize - usize::from(structure == Structure::Sc),
+            Boundary::Floppy | Boundary::Graded => 0,
+        };
+        let (mut n, mut rings, mut first_mm) = ([0; 3], [0; 3], [0.0; 3]);
+        for a in 0..3 {
+            let length = grid.size_mm()[a];
+            // User spacings hit exact multiples: 1e-9 keeps rounding from losing a plane.
+            let whole = (length / step_mm + 1e-9).floor() as usize;
+            let loaded = a == axis.index();
+            let proper = whole + usize::from(loaded);
+            let least = if loaded { 2 } else { 1 };
+            if proper < least || (structure != Structure::Sc && whole < 2) {
+                return Err(Error::setting(
+                    "lp",
+                    format!(
+                        "a lattice parameter of {lp_mm} mm does not fit a specimen of {length:.4} mm along {}",
+                        ["x", "y", "z"][a]
+                    ),
+                    "give a smaller lattice parameter",
+                ));
+            }
+            first_mm[a] = 0.5 * (length - (proper - 1) as f64 * step_mm) + registration_mm[a];
+            rings[a] = if loaded { 0 } else { ring };
+            n[a] = proper + 2 * rings[a];
+        }
+        Ok(Frame {
+            structure,
+            axis,
+            lp_mm,
+            step_mm,
+            n,
+            rings,
+            first_mm,
+        })
+    }
+
+    /// Grid indices of candidate `c`, counted from the first proper site.
+    pub fn indices(&self, c: usize) -> [i32; 3] {
+        let (i, rest) = (c % self.n[0], c / self.n[0]);
+        let (j, k) = (rest % self.n[1], rest / self.n[1]);
+        let of = |v: usize, a: usize| v as i32 - self.rings[a] as i32;
+        [of(i, 0), of(j, 1), of(k, 2)]
+    }
+
+    /// Candidate at grid indices, if within the frame.
+    pub fn candidate(&self, indices: [i32; 3]) -> Option<usize> {
+        let mut c = [0; 3];
+        for a in 0..3 {
+            let v = indices[a] + self.rings[a] as i32;
+            if v < 0 || v as usize >= self.n[a] {
+                return None;
+            }
+            c[a] = v as usize;
+        }
+        Some((c[2] * self.n[1] + c[1]) * self.n[0] + c[0])
+    }
+
+    pub fn position_mm(&self, indices: [i32; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| self.first_mm[a] + f64::from(indices[a]) * self.step_mm)
+    }
+
+    pub fn candidates(&self) -> usize {
+        self.n.iter().product()
+    }
+
+    /// Proper planes along the load axis.
+    pub fn planes(&self) -> usize {
+        self.n[self.axis.index()]
+    }
+}
+
+/// Weight of every candidate: 0 where no site exists, 1 for firm and floppy sites, the bone fraction for graded ones.
+pub fn weigh(frame: &Frame, bone: &Volume<u8>, boundary: Boundary) -> Vec<f32> {
+    let weight = |indices: [i32; 3]| match boundary {
+        _ if !frame.structure.allows(indices) => 0.0,
+        Boundary::Floppy => f32::from(in_bone(bone, frame.position_mm(indices))),
+        Boundary::Firm => {
+            let radius = 1.1 * frame.structure.first_neighbour() * frame.lp_mm;
+            f32::from(u8::from(near_bone(
+                bone,
+                frame.position_mm(indices),
+                radius,
+            )))
+        }
+        Boundary::Graded => {
+            let edge = frame.lp_mm * frame.structure.cell_volume().cbrt();
+            let w = bone_fraction(bone, frame.position_mm(indices), edge);
+            if w > LEAST_FRACTION { w as f32 } else { 0.0 }
+        }
+    };
+    (0..frame.candidates())
+        .into_par_iter()
+        .map(|c| weight(frame.indices(c)))
+        .collect()
+}
+
+/// 1 if the voxel that contains the position (or the nearest on the volume's faces) is bone.
+fn in_bone(bone: &Volume<u8>, position_mm: [f64; 3]) -> u8 {
+    u8::from(bone.as_slice()[bone.grid.index(bone.grid.voxel_at(position_mm))] != 0)
+}
+
+/// Whether a bone voxel's centre lies within `radius` of a position.
+fn near_bone(bone: &Volume<u8>, position_mm: [f64; 3], radius: f64) -> bool {
+    let (grid, values) = (&bone.grid, bone.as_slice());
+    let squared = radius * radius * (1.0 + 1e-12);
+    let [h0, h1, h2] = grid.spacing_mm;
+    let (k0, k1) = centres_within(position_mm[2], radius, h2, grid.n[2]);
+    for k in k0..k1 {
+        let dz = (k as f64 + 0.5) * h2 - position_mm[2];
+        let left = squared - dz * dz;
+        if left < 0.0 {
+            continue;
+        }
+        let (j0, j1) = centres_within(position_mm[1], left.sqrt(), h1, grid.n[1]);
+        for j in j0..j1 {
+            let dy = (j as f64 + 0.5) * h1 - position_mm[1];
+            let left = left - dy * dy;
+            if left < 0.0 {
+                continue;
+            }
+            let (i0, i1) = centres_within(position_mm[0], left.sqrt(), h0, grid.n[0]);
+            if i0 < i1 {
+                let row = grid.index([0, j, k]);
+                if values[row + i0..row + i1].iter().any(|&b| b != 0) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
+}
+
+/// Voxels `first..past` along one axis whose centres lie within `radius` of `x`.
+fn centres_within(x: f64, radius: f64, h: f64, n: usize) -> (usize, usize) {
+    let low = ((x - radius) / h - 0.5).ceil().max(0.0);
+    let high = ((x + radius) / h - 0.5).floor();
+    if high < 0.0 {
+        (0, 0)
+    } else {
+        (low as usize, (high as usize + 1).min(n))
+    }
+}
+
+/// Share of bone in the cube of edge `edge` around a position, of the part of the cube inside the volume.
+fn bone_fraction(bone: &Volume<u8>, position_mm: [f64; 3], edge: f64) -> f64 {
+    let (grid, values) = (&bone.grid, bone.as_slice());
+    let spans: [Vec<(usize, f64)>; 3] =
+        std::array::from_fn(|a| overlaps(position_mm[a], edge, grid.spacing_mm[a], grid.n[a]));
+    let (mut bone_volume, mut volume) = (0.0, 0.0);
+    for &(k, wz) in &spans[2] {
+        for &(j, wy) in &spans[1] {
+            let row = grid.index([0, j, k]);
+            for &(i, wx) in &spans[0] {
+                let w = wx * wy * wz;
+                volume += w;
+                bone_volume += w * f64::from(u8::from(values[row + i] != 0));
+            }
+        }
+    }
+    if volume > 0.0 {
+        bone_volume / volume
+    } else {
+        0.0
+    }
+}
+
+/// Voxels along one axis that a span of length `edge` around `x` overlaps, with the overlaps' lengths.
+fn overlaps(x: f64, edge: f64, h: f64, n: usize) -> Vec<(usize, f64)> {
+    let (low, high) = (x - 0.5 * edge, x + 0.5 * edge);
+    let first = (low / h).floor().max(0.0) as usize;
+    let past = ((high / h).ceil().max(0.0) as usize).min(n);
+    (first..past)
+        .map(|i| (i, (high.min((i + 1) as f64 * h) - low.max(i as f64 * h))))
+        .filter(|&(_, w)| w > 1e-12 * h)
+        .collect()
+}

@@ -1,0 +1,181 @@
+//! Owns the lattice of one specimen: its sites, their neighbours, its grips, and what was dropped.
+
+use crate::topology::placement::Frame;
+use crate::topology::stencil::Stencil;
+use rayon::prelude::*;
+
+/// Sites that carry load, numbered with x fastest.
+#[derive(Debug, Clone)]
+pub struct Sites {
+    pub frame: Frame,
+    /// Grid indices of each site.
+    pub indices: Vec<[i32; 3]>,
+    /// `coordination` entries per site; a missing neighbour is the site itself (its bond then stretches by nothing).
+    pub neighbours: Vec<u32>,
+    /// Share of a whole site's stiffness, only where sites differ (graded).
+    pub weights: Option<Vec<f64>>,
+    /// Planes (indices along the load axis) up to which, and from which, sites are gripped.
+    pub grips: Grips,
+    /// Sites that exist but have no path of bonds to both grips.
+    pub dropped: usize,
+}
+
+/// Planes along the load axis that are held: `0..=low` and `high..`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Grips {
+    pub low: i32,
+    pub high: i32,
+}
+
+impl Grips {
+    /// Grips of thickness `grip_mm` from each face, at least the end planes (BCC and FCC: the end planes of both
+    /// sublattices, that is all sites within LP/2). None where the grips meet.
+    pub fn new(frame: &Frame, length_mm: f64, grip_mm: f64) -> Option<Self> {
+        let a = frame.axis.index();
+        let last = frame.planes() as i32 - 1;
+        let least = frame.structure.steps_per_lp() as i32 - 1;
+        let within = |depth: f64| ((depth + 1e-9 * frame.step_mm) / frame.step_mm).floor() as i32;
+        let last_mm = frame.first_mm[a] + f64::from(last) * frame.step_mm;
+        let low = within(grip_mm - frame.first_mm[a]).max(least);
+        let high = last - within(grip_mm - (length_mm - last_mm)).max(least);
+        (low < high).then_some(Grips { low, high })
+    }
+
+    pub fn holds(&self, plane: i32) -> bool {
+        plane <= self.low || plane >= self.high
+    }
+}
+
+impl Sites {
+    /// Builds the lattice from the candidates' weights, keeping what has a path of bonds to both grips.
+    pub fn connect(frame: Frame, weights: &[f32], grips: Grips) -> Self {
+        let stencil = frame.structure.stencil();
+        let carrying = load_carrying(&frame, weights, &stencil, grips);
+        let existing = weights.iter().filter(|&&w| w > 0.0).count();
+        let mut number = vec![u32::MAX; frame.candidates()];
+        let mut kept = Vec::new();
+        for c in 0..frame.candidates() {
+            if carrying[c] {
+                number[c] = kept.len() as u32;
+                kept.push(c);
+            }
+        }
+        let indices: Vec<[i32; 3]> = kept.iter().map(|&c| frame.indices(c)).collect();
+        let z = stencil.coordination();
+        let mut neighbours = vec![0; kept.len() * z];
+        neighbours
+            .par_chunks_mut(z)
+            .zip(&indices)
+            .enumerate()
+            .for_each(|(s, (row, &at))| {
+                for (b, slot) in row.iter_mut().enumerate() {
+                    let found = step(&frame, at, stencil.direction(b)).map(|c| number[c]);
+                    *slot = found.filter(|&n| n != u32::MAX).unwrap_or(s as u32);
+                }
+            });
+        let graded = weights.iter().any(|&w| w > 0.0 && w < 1.0);
+        let weights = graded.then(|| kept.iter().map(|&c| f64::from(weights[c])).collect());
+        Sites {
+            frame,
+            dropped: existing - kept.len(),
+            indices,
+            neighbours,
+            weights,
+            grips,
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.indices.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.indices.is_empty()
+    }
+
+    /// Index of a site's plane along the load axis.
+    pub fn plane(&self, site: usize) -> i32 {
+        self.indices[site][self.frame.axis.index()]
+    }
+
+    /// Whether a site lies on (or, padded, beyond) an outermost proper plane along direction `c`.
+    pub fn on_side(&self, site: usize, c: usize) -> bool {
+        let proper = self.frame.n[c] as i32 - 2 * self.frame.rings[c] as i32;
+        let at = self.indices[site][c];
+        at <= 0 || at >= proper - 1
+    }
+
+    /// Bonds, each counted once.
+    pub fn bonds(&self) -> usize {
+        let z = self.frame.structure.stencil().coordination();
+        let ends: usize = self
+            .neighbours
+            .par_chunks(z)
+            .enumerate()
+            .map(|(s, row)| row.iter().filter(|&&n| n as usize != s).count())
+            .sum();
+        ends / 2
+    }
+
+    /// Whether a site has all its bonds; on the loaded faces, all the bonds that stay inside the volume.
+    pub fn fully_coordinated(&self, site: usize) -> bool {
+        let stencil = self.frame.structure.stencil();
+        let (z, a) = (stencil.coordination(), self.frame.axis.index());
+        let last = self.frame.planes() as i32 - 1;
+        (0..z).all(|b| {
+            let plane = self.plane(site) + stencil.direction(b)[a];
+            plane < 0 || plane > last || self.neighbours[site * z + b] as usize != site
+        })
+    }
+
+    /// Distance of the innermost gripped planes in mm.
+    pub fn gauge_length_mm(&self) -> f64 {
+        f64::from(self.grips.high - self.grips.low) * self.frame.step_mm
+    }
+
+    /// Volume of one site's cell in mm³.
+    pub fn cell_mm3(&self) -> f64 {
+        self.frame.structure.cell_volume() * self.frame.lp_mm.powi(3)
+    }
+}
+
+/// The candidate one bond away, if within the frame.
+fn step(frame: &Frame, at: [i32; 3], direction: [i32; 3]) -> Option<usize> {
+    frame.candidate(std::array::from_fn(|a| at[a] + direction[a]))
+}
+
+/// Candidates with a path of bonds to both grips.
+fn load_carrying(frame: &Frame, weights: &[f32], stencil: &Stencil, grips: Grips) -> Vec<bool> {
+    let a = frame.axis.index();
+    let low = reached(frame, weights, stencil, |at| at[a] <= grips.low);
+    let high = reached(frame, weights, stencil, |at| at[a] >= grips.high);
+    low.into_iter().zip(high).map(|(l, h)| l && h).collect()
+}
+
+/// Candidates with a path of bonds to a seed.
+fn reached(
+    frame: &Frame,
+    weights: &[f32],
+    stencil: &Stencil,
+    seed: impl Fn([i32; 3]) -> bool,
+) -> Vec<bool> {
+    let mut seen = vec![false; weights.len()];
+    let mut queue: Vec<usize> = (0..weights.len())
+        .filter(|&c| weights[c] > 0.0 && seed(frame.indices(c)))
+        .collect();
+    for &c in &queue {
+        seen[c] = true;
+    }
+    while let Some(c) = queue.pop() {
+        let at = frame.indices(c);
+        for b in 0..stencil.coordination() {
+            if let Some(n) = step(frame, at, stencil.direction(b)) {
+                if weights[n] > 0.0 && !seen[n] {
+                    seen[n] = true;
+                    queue.push(n);
+                }
+            }
+        }
+    }
+    seen
+}

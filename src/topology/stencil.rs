@@ -1,0 +1,160 @@
+//! Owns the three cubic lattices: where sites may sit and which bonds a site has.
+
+use serde::{Deserialize, Serialize};
+
+/// The cubic lattice. Sites sit on a grid of spacing `g`: SC uses every node, `g = LP`; BCC and FCC use the nodes
+/// allowed by a parity rule, `g = LP/2`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum Structure {
+    #[default]
+    Sc,
+    Bcc,
+    Fcc,
+}
+
+/// Bonds of one site, in grid steps: opposite bonds stand next to each other, the first shell comes first.
+#[derive(Debug, Clone, Copy)]
+pub struct Stencil {
+    /// One direction of each opposite pair; the other is its negative.
+    pub pairs: &'static [[i32; 3]],
+    /// How many of the pairs belong to the first shell.
+    pub first_shell_pairs: usize,
+}
+
+const SC: [[i32; 3]; 9] = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 1, 0],
+    [1, -1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+];
+
+const BCC: [[i32; 3]; 7] = [
+    [1, 1, 1],
+    [1, 1, -1],
+    [1, -1, 1],
+    [1, -1, -1],
+    [2, 0, 0],
+    [0, 2, 0],
+    [0, 0, 2],
+];
+
+const FCC: [[i32; 3]; 9] = [
+    [1, 1, 0],
+    [1, -1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+    [2, 0, 0],
+    [0, 2, 0],
+    [0, 0, 2],
+];
+
+impl Structure {
+    pub const ALL: [Structure; 3] = [Structure::Sc, Structure::Bcc, Structure::Fcc];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Structure::Sc => "sc",
+            Structure::Bcc => "bcc",
+            Structure::Fcc => "fcc",
+        }
+    }
+
+    /// Bonds of a site: 6 + 12 (SC), 8 + 6 (BCC), 12 + 6 (FCC).
+    pub fn stencil(self) -> Stencil {
+        match self {
+            Structure::Sc => Stencil {
+                pairs: &SC,
+                first_shell_pairs: 3,
+            },
+            Structure::Bcc => Stencil {
+                pairs: &BCC,
+                first_shell_pairs: 4,
+            },
+            Structure::Fcc => Stencil {
+                pairs: &FCC,
+                first_shell_pairs: 6,
+            },
+        }
+    }
+
+    /// Grid steps per lattice parameter.
+    pub fn steps_per_lp(self) -> f64 {
+        if self == Structure::Sc { 1.0 } else { 2.0 }
+    }
+
+    /// Whether a site may sit at these grid indices; `(0, 0, 0)` always is a site.
+    pub fn allows(self, [i, j, k]: [i32; 3]) -> bool {
+        let odd = |v: i32| v & 1;
+        match self {
+            Structure::Sc => true,
+            Structure::Bcc => odd(i) == odd(j) && odd(j) == odd(k),
+            Structure::Fcc => odd(i + j + k) == 0,
+        }
+    }
+
+    /// Distance of first neighbours in lattice parameters.
+    pub fn first_neighbour(self) -> f64 {
+        match self {
+            Structure::Sc => 1.0,
+            Structure::Bcc => 0.75f64.sqrt(),
+            Structure::Fcc => 0.5f64.sqrt(),
+        }
+    }
+
+    /// Volume of a site's cell in LP³.
+    pub fn cell_volume(self) -> f64 {
+        match self {
+            Structure::Sc => 1.0,
+            Structure::Bcc => 0.5,
+            Structure::Fcc => 0.25,
+        }
+    }
+}
+
+impl Stencil {
+    /// Bonds of a fully coordinated site.
+    pub fn coordination(&self) -> usize {
+        2 * self.pairs.len()
+    }
+
+    /// Direction of bond `b`: even bonds point along their pair, odd ones against it.
+    pub fn direction(&self, b: usize) -> [i32; 3] {
+        let sign = if b.is_multiple_of(2) { 1 } else { -1 };
+        self.pairs[b / 2].map(|c| sign * c)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bonds_lead_from_site_to_site_and_have_the_paper_counts() {
+        // Zojaji et al. 2024: 18 bonds for SC and FCC, 14 for BCC; shells 6+12, 8+6, 12+6.
+        for (s, z, first) in [
+            (Structure::Sc, 18, 6),
+            (Structure::Bcc, 14, 8),
+            (Structure::Fcc, 18, 12),
+        ] {
+            let stencil = s.stencil();
+            assert_eq!(stencil.coordination(), z);
+            assert_eq!(2 * stencil.first_shell_pairs, first);
+            for b in 0..z {
+                let d = stencil.direction(b);
+                assert!(s.allows(d), "{s:?} {d:?}");
+                let length =
+                    (d.iter().map(|c| c * c).sum::<i32>() as f64).sqrt() / s.steps_per_lp();
+                let in_first = b < first;
+                assert_eq!((length - s.first_neighbour()).abs() < 1e-12, in_first);
+            }
+        }
+    }
+}

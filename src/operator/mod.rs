@@ -3,6 +3,7 @@
 //! `D` is the number of unknowns per site: 1 for conduction, 2 and 3 for displacements, 3 in the plane with rotation.
 
 pub mod held;
+pub mod reduction;
 
 /// A symmetric positive semi-definite linear operator on `sites() × D` unknowns.
 pub trait Operator<const D: usize>: Sync {

@@ -1,5 +1,7 @@
 //! Algorithms that see an operator, never the physics behind it.
 
 pub mod cg;
+pub mod direct;
 pub mod estimate;
 pub mod jacobi;
+pub mod sparse;

@@ -1,5 +1,10 @@
 //! Who touches whom, without any moduli: lattice sites, voxel meshes, families of points.
 
+pub mod dissection;
+pub mod family;
+pub mod layers;
+pub mod outline;
 pub mod placement;
+pub mod plane;
 pub mod sites;
 pub mod stencil;

@@ -2,5 +2,6 @@
 
 pub mod lattice;
 pub mod report;
+pub mod scene;
 pub mod segment;
 pub mod solve;

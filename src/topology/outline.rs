@@ -225,8 +225,8 @@ fn cells_of(key: &str, cells: f64) -> Result<usize> {
     ))
 }
 
-/// Even-odd rule.
-fn winds(corners: &[[f64; 2]], p: [f64; 2]) -> bool {
+/// Whether a point is inside a closed polygon, by the even-odd rule.
+pub fn winds(corners: &[[f64; 2]], p: [f64; 2]) -> bool {
     let next = |i: usize| corners[(i + 1) % corners.len()];
     let crosses = |i: usize| {
         let (a, b) = (corners[i], next(i));

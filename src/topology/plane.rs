@@ -151,7 +151,7 @@ impl Points {
                 sizes[smallest],
                 sizes.iter().max().unwrap_or(&0),
             ),
-            "keep one piece (geometry.keep = \"largest\"), join them, or refine grid.spacing",
+            "keep the largest alone (grid.keep_largest = true), join them, or refine grid.spacing",
         ))
     }
 

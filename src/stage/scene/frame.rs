@@ -1,0 +1,101 @@
+//! Owns what a running scene tells the outside: states as they are accepted, and a closing summary.
+
+use crate::error::Result;
+use crate::topology::plane::Points;
+use serde::{Deserialize, Serialize};
+
+/// What a scene writes, and when.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// Times at which fields are written, besides the last.
+    pub times: Vec<f64>,
+    /// Also every so many time units.
+    pub every: Option<f64>,
+    /// Fields to draw as maps; empty: the first scalar.
+    pub maps: Vec<String>,
+    /// Range of the maps' colours; by default that of all written states.
+    pub range: Option<[f64; 2]>,
+    /// Also an animation of the maps (GIF).
+    pub animation: bool,
+    /// Also a series for ParaView.
+    pub vtk: bool,
+}
+
+impl Output {
+    /// Whether fields are due after a step from `before` to `now`.
+    pub fn due(&self, before: f64, now: f64) -> bool {
+        let slack = 1e-9 * now.abs().max(1e-300);
+        let passed = |t: f64| before + slack < t && t <= now + slack;
+        let multiple =
+            |every: f64| ((now + slack) / every).floor() > ((before + slack) / every).floor();
+        self.times.iter().any(|&t| passed(t)) || self.every.is_some_and(multiple)
+    }
+}
+
+/// An accepted state.
+#[derive(Debug, Clone, Default)]
+pub struct Frame {
+    pub time: f64,
+    /// A row of `history.csv`; the same names in every frame.
+    pub numbers: Vec<(String, f64)>,
+    /// Only when due.
+    pub fields: Vec<Field>,
+}
+
+/// Values at the material points.
+#[derive(Debug, Clone)]
+pub struct Field {
+    pub name: &'static str,
+    pub values: Values,
+}
+
+#[derive(Debug, Clone)]
+pub enum Values {
+    Scalar(Vec<f64>),
+    Vector(Vec<[f64; 2]>),
+}
+
+/// Receives what happens while a scene runs.
+pub trait Observer {
+    /// Before the first state. `steps` is the number of steps foreseen.
+    fn start(&mut self, points: &Points, steps: usize) -> Result<()>;
+    fn frame(&mut self, frame: &Frame) -> Result<()>;
+    /// Something worth a line: a halved step, a refactorisation.
+    fn say(&mut self, line: &str);
+}
+
+/// How a scene ended.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Summary {
+    pub points: usize,
+    /// Unknowns solved for, in all.
+    pub unknowns: usize,
+    /// Bonds, each counted once.
+    pub bonds: usize,
+    pub steps: usize,
+    pub converged: bool,
+    /// Further numbers by name.
+    pub numbers: Vec<(String, f64)>,
+    /// Why it stopped early, where it did.
+    pub stopped: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_are_due_once() {
+        let output = Output {
+            times: vec![0.25],
+            every: Some(1.0),
+            ..Output::default()
+        };
+        let step = |k: usize| 0.1 * k as f64;
+        let due: Vec<usize> = (1..=20)
+            .filter(|&k| output.due(step(k - 1), step(k)))
+            .collect();
+        assert_eq!(due, [3, 10, 20]);
+    }
+}

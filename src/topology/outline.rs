@@ -105,23 +105,20 @@ impl Outline {
 impl Rectangle {
     fn points(&self, spacing: f64) -> Result<Points> {
         let mut n = [0; 2];
-        for a in 0..2 {
-            let cells = self.size[a] / spacing;
+        for (n, size) in n.iter_mut().zip(self.size) {
+            let cells = size / spacing;
             let whole = cells.round();
-            if !(whole >= 1.0 && whole < 1e5) || (cells - whole).abs() > 1e-6 * whole {
+            if !(1.0..1e5).contains(&whole) || (cells - whole).abs() > 1e-6 * whole {
                 return Err(Error::setting(
                     "geometry.rectangle.size",
-                    format!(
-                        "{} is not a whole number of cells of {spacing}",
-                        self.size[a]
-                    ),
+                    format!("{size} is not a whole number of cells of {spacing}"),
                     format!(
                         "the nearest that fits is {}",
                         whole.clamp(1.0, 1e5) * spacing
                     ),
                 ));
             }
-            n[a] = whole as usize;
+            *n = whole as usize;
         }
         let shift = if self.nodal { 0.5 * spacing } else { 0.0 };
         let more = usize::from(self.nodal);

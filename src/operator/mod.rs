@@ -4,6 +4,7 @@
 
 pub mod held;
 pub mod reduction;
+pub mod sparse;
 
 /// A symmetric positive semi-definite linear operator on `sites() × D` unknowns.
 pub trait Operator<const D: usize>: Sync {

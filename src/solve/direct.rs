@@ -1,7 +1,7 @@
 //! Owns sparse direct solution by faer: the symbolic factorisation is done once per pattern and reused.
 
 use crate::error::{Error, Result};
-use crate::solve::sparse::Sparse;
+use crate::operator::sparse::Sparse;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::solvers::SolveCore;
 use faer::perm::PermRef;

@@ -4,4 +4,3 @@ pub mod cg;
 pub mod direct;
 pub mod estimate;
 pub mod jacobi;
-pub mod sparse;

@@ -5,7 +5,7 @@
 //!
 //! | layer | module | owns |
 //! |---|---|---|
-//! | 0 | [`error`], [`par`] | what is told to the person at the keyboard; vector sums that repeat on any number of threads |
+//! | 0 | [`error`], [`par`], [`simd`] | what is told to the person at the keyboard; vector sums that repeat on any number of threads; eight lanes chosen at run time |
 //! | 1 | [`grid`] | indices, voxels, millimetres |
 //! | 2 | [`volume`] | values on a grid; the segmented specimen |
 //! | 3 | [`mask`] | smoothing, thresholds, volumes of interest, connected components |
@@ -28,6 +28,7 @@ pub mod par;
 pub mod physics;
 pub mod recipe;
 pub mod run;
+pub mod simd;
 pub mod solve;
 pub mod stage;
 pub mod topology;

@@ -2,6 +2,7 @@
 //!
 //! `D` is the number of unknowns per site: 1 for conduction, 2 and 3 for displacements, 3 in the plane with rotation.
 
+pub mod coarsen;
 pub mod held;
 pub mod reduction;
 pub mod sparse;

@@ -1,3 +1,4 @@
 //! Energies and the forces that follow from them. No physics imports another, or a solver.
 
+pub mod hex8;
 pub mod lattice;

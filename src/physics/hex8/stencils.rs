@@ -1,0 +1,80 @@
+//! Owns the rows of the operator: for each of the 256 ways in which the elements around a node can exist, the 27
+//! blocks that couple it to its neighbours, laid out for eight lanes.
+
+use super::element::ElementMatrix;
+use crate::operator::coarsen::Block;
+
+/// Scalars per stencil. Nine rows of neighbours (dy fastest, then dz), each three components of the force times the
+/// first eight of nine displacements (dx slowest, then component): 216. Then per row the ninth displacement's
+/// column of three, padded to four: 36. Padded to a whole number of cache lines.
+pub const STRIDE: usize = 256;
+/// Where the ninth columns begin.
+pub const NINTH: usize = 216;
+
+/// All 256 stencils.
+#[derive(Debug, Clone)]
+pub struct Stencils<S> {
+    table: Vec<S>,
+}
+
+impl<S: Copy> Stencils<S> {
+    #[inline(always)]
+    pub fn stencil(&self, around: u8) -> &[S; STRIDE] {
+        let start = around as usize * STRIDE;
+        self.table[start..start + STRIDE]
+            .try_into()
+            .expect("a stencil has STRIDE scalars")
+    }
+}
+
+impl Stencils<f64> {
+    pub fn new(k: &ElementMatrix) -> Self {
+        let mut table = vec![0.0; 256 * STRIDE];
+        for (around, stencil) in table.chunks_exact_mut(STRIDE).enumerate() {
+            for element in (0..8).filter(|e| around >> e & 1 == 1) {
+                add_element(stencil, element, k);
+            }
+        }
+        Stencils { table }
+    }
+
+    pub fn to_f32(&self) -> Stencils<f32> {
+        Stencils {
+            table: self.table.iter().map(|&v| v as f32).collect(),
+        }
+    }
+
+    /// The block that couples a node to its neighbour `(dx, dy, dz) + 1`, each 0, 1 or 2.
+    pub fn block(&self, around: u8, [dx, dy, dz]: [usize; 3]) -> Block {
+        let (stencil, row) = (self.stencil(around), dy + 3 * dz);
+        std::array::from_fn(|a| std::array::from_fn(|b| stencil[slot(row, a, 3 * dx + b)] as f32))
+    }
+
+    /// The diagonal of the node's own block.
+    pub fn diagonal(&self, around: u8) -> [f64; 3] {
+        let stencil = self.stencil(around);
+        std::array::from_fn(|a| stencil[slot(4, a, 3 + a)])
+    }
+}
+
+/// Place of the coefficient of displacement `column` (3 dx + component) of a row in force component `a`.
+fn slot(row: usize, a: usize, column: usize) -> usize {
+    if column < 8 {
+        row * 24 + a * 8 + column
+    } else {
+        NINTH + 4 * row + a
+    }
+}
+
+fn add_element(stencil: &mut [f64], element: usize, k: &ElementMatrix) {
+    let upper: [usize; 3] = std::array::from_fn(|a| element >> a & 1);
+    let own = (0..3).map(|a| (1 - upper[a]) << a).sum::<usize>();
+    for corner in 0..8usize {
+        let d: [usize; 3] = std::array::from_fn(|a| upper[a] + (corner >> a & 1));
+        for a in 0..3 {
+            for b in 0..3 {
+                stencil[slot(d[1] + 3 * d[2], a, 3 * d[0] + b)] += k[3 * own + a][3 * corner + b];
+            }
+        }
+    }
+}

@@ -30,6 +30,7 @@ pub fn isa() -> Isa {
 /// # Safety
 /// The methods of an implementation may be called only where its instruction set is available; pointers must be valid
 /// for the lanes that are read or written. No alignment is asked for.
+#[allow(clippy::missing_safety_doc)] // one contract for all methods, above
 pub trait Lanes: Copy {
     type S: Copy + Default;
     type Four: Copy;

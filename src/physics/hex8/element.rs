@@ -121,7 +121,7 @@ mod tests {
 
     fn energy(k: &ElementMatrix, h: [f64; 3], grad: [[f64; 3]; 3]) -> f64 {
         let u: [f64; 24] = std::array::from_fn(|i| {
-            let x: [f64; 3] = std::array::from_fn(|a| (i / 3 >> a & 1) as f64 * h[a]);
+            let x: [f64; 3] = std::array::from_fn(|a| ((i / 3) >> a & 1) as f64 * h[a]);
             (0..3).map(|b| grad[i % 3][b] * x[b]).sum()
         });
         let forces = k.map(|row| row.iter().zip(&u).map(|(a, b)| a * b).sum::<f64>());

@@ -138,7 +138,7 @@ mod tests {
         let mut y = vec![[0.0; 3]; x.len()];
         op.apply(&x, &mut y);
         let mut blocks = Vec::new();
-        for site in 0..x.len() {
+        for (site, y) in y.iter().enumerate() {
             blocks.clear();
             op.row(site, &mut blocks);
             let mut sum = [0.0; 3];
@@ -149,7 +149,7 @@ mod tests {
                     }
                 }
             }
-            assert!((0..3).all(|a| (sum[a] - y[site][a]).abs() < 1e-4));
+            assert!((0..3).all(|a| (sum[a] - y[a]).abs() < 1e-4));
         }
     }
 

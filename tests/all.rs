@@ -1,4 +1,6 @@
 //! One test program. Each module is one subject.
 
 mod cli;
+mod laws;
 mod layers;
+mod patch;

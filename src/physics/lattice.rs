@@ -210,7 +210,8 @@ impl<'a> Lattice<'a> {
         })
     }
 
-    fn site_energy(&self, u: &[[f64; 3]], site: usize) -> f64 {
+    /// Energy of one site in N mm, by the formula of the module's head.
+    pub fn site_energy(&self, u: &[[f64; 3]], site: usize) -> f64 {
         let mut springs = 0.0;
         for (p, pair) in self.pairs.iter().enumerate() {
             let (plus, minus) = self.ends(site, p);

@@ -1,0 +1,252 @@
+//! The table of three-dimensional models, and the laws every one of them must obey. A new physics is one row.
+
+use bonepd_ct::grid::{Axis, Grid};
+use bonepd_ct::operator::Operator;
+use bonepd_ct::operator::held::{Constrained, Held};
+use bonepd_ct::par::dot;
+use bonepd_ct::physics::lattice::{Lattice, Moduli};
+use bonepd_ct::solve::cg::{CgParams, minimise};
+use bonepd_ct::solve::jacobi::Jacobi;
+use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build};
+use bonepd_ct::volume::{Specimen, Volume};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+type Field = Vec<[f64; 3]>;
+
+/// One row: a model on an irregular specimen.
+struct Model {
+    name: String,
+    operator: Box<dyn Operator<3>>,
+    positions: Field,
+    energy: Box<dyn Fn(&[[f64; 3]]) -> f64>,
+}
+
+/// A 14³ box of voxels with holes, lumps and free corners, and unequal spacing.
+pub fn irregular_specimen() -> Specimen {
+    let grid = Grid::new([14, 13, 12], [0.021, 0.02, 0.019]);
+    let mut random = Pcg64::seed_from_u64(3);
+    let solid: Vec<u8> = (0..grid.len())
+        .map(|_| u8::from(random.random::<f64>() < 0.8))
+        .collect();
+    let tv_mm3 = grid.size_mm().iter().product();
+    let bone = Volume::from_vec(grid, solid);
+    Specimen {
+        name: "irregular".into(),
+        bone,
+        tv_mm3,
+        tv_definition: "box".into(),
+    }
+}
+
+fn lattice_row(structure: Structure, boundary: Boundary, poisson: f64) -> Model {
+    let case = Case {
+        structure,
+        lp_mm: 0.04,
+        boundary,
+        registration_mm: [0.0; 3],
+    };
+    // A row lives as long as the test program, so its sites may, too.
+    let sites = Box::leak(Box::new(
+        build(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap(),
+    ));
+    assert!(
+        sites.len() > 100,
+        "{structure:?} {boundary:?}: {} sites",
+        sites.len()
+    );
+    let moduli = Moduli::new(structure, 0.04, 1000.0, poisson).unwrap();
+    let positions = sites
+        .indices
+        .iter()
+        .map(|&i| sites.frame.position_mm(i))
+        .collect();
+    let twin = Lattice::new(sites, moduli);
+    Model {
+        name: format!("{} {} ν={poisson}", structure.name(), boundary.name()),
+        operator: Box::new(Lattice::new(sites, moduli)),
+        positions,
+        energy: Box::new(move |u| twin.energy(u)),
+    }
+}
+
+fn models() -> Vec<Model> {
+    let mut rows = Vec::new();
+    for structure in Structure::ALL {
+        for boundary in [Boundary::Floppy, Boundary::Firm, Boundary::Graded] {
+            for poisson in [0.25, 0.3] {
+                rows.push(lattice_row(structure, boundary, poisson));
+            }
+        }
+    }
+    rows
+}
+
+fn random_field(n: usize, seed: u64) -> Field {
+    let mut random = Pcg64::seed_from_u64(seed);
+    (0..n)
+        .map(|_| std::array::from_fn(|_| random.random::<f64>() - 0.5))
+        .collect()
+}
+
+fn applied(operator: &dyn Operator<3>, x: &[[f64; 3]]) -> Field {
+    let mut y = vec![[0.0; 3]; operator.sites()];
+    operator.apply(x, &mut y);
+    y
+}
+
+fn largest(v: &[[f64; 3]]) -> f64 {
+    v.iter().flatten().fold(0.0, |m: f64, c| m.max(c.abs()))
+}
+
+#[test]
+fn operators_are_symmetric() {
+    for m in models() {
+        let (x, y) = (
+            random_field(m.positions.len(), 1),
+            random_field(m.positions.len(), 2),
+        );
+        let (left, right) = (
+            dot(&y, &applied(&*m.operator, &x)),
+            dot(&x, &applied(&*m.operator, &y)),
+        );
+        // Measured: at most 1e-15 of the products' scale.
+        let scale = dot(&x, &applied(&*m.operator, &x));
+        assert!(
+            (left - right).abs() < 1e-13 * scale,
+            "{}: {left} {right}",
+            m.name
+        );
+    }
+}
+
+#[test]
+fn rigid_motions_are_force_free() {
+    for m in models() {
+        let scale = largest(&applied(&*m.operator, &random_field(m.positions.len(), 1)));
+        for motion in 0..6 {
+            let u: Field = m.positions.iter().map(|&p| rigid(p, motion)).collect();
+            let force = largest(&applied(&*m.operator, &u));
+            assert!(
+                force < 1e-13 * scale,
+                "{} motion {motion}: {force} of {scale}",
+                m.name
+            );
+        }
+    }
+}
+
+/// Translations along x, y, z, then infinitesimal rotations about them.
+fn rigid(p: [f64; 3], motion: usize) -> [f64; 3] {
+    let mut u = [0.0; 3];
+    if motion < 3 {
+        u[motion] = 1.0;
+    } else {
+        let (a, b) = ((motion + 1) % 3, (motion + 2) % 3);
+        (u[a], u[b]) = (-p[b], p[a]);
+    }
+    u
+}
+
+#[test]
+fn forces_sum_to_zero() {
+    for m in models() {
+        let force = applied(&*m.operator, &random_field(m.positions.len(), 4));
+        for c in 0..3 {
+            let sum: f64 = force.iter().map(|f| f[c]).sum();
+            assert!(
+                sum.abs() < 1e-12 * largest(&force) * (force.len() as f64).sqrt(),
+                "{}: {sum}",
+                m.name
+            );
+        }
+    }
+}
+
+#[test]
+fn the_force_is_the_gradient_of_the_energy() {
+    for m in models() {
+        let u = random_field(m.positions.len(), 5);
+        let force = applied(&*m.operator, &u);
+        let direction = random_field(m.positions.len(), 6);
+        // Quadratic energy: central differences are exact but for rounding.
+        let step = 1e-3;
+        let moved = |s: f64| -> Field {
+            let along = |(u, d): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| u[c] + s * d[c]);
+            u.iter().zip(&direction).map(along).collect()
+        };
+        let slope = ((m.energy)(&moved(step)) - (m.energy)(&moved(-step))) / (2.0 * step);
+        let work = dot(&force, &direction);
+        assert!(
+            (slope - work).abs() < 1e-9 * (m.energy)(&u),
+            "{}: {slope} {work}",
+            m.name
+        );
+    }
+}
+
+#[test]
+fn the_diagonal_is_that_of_the_operator() {
+    for m in models() {
+        let n = m.positions.len();
+        let mut diagonal = vec![[0.0; 3]; n];
+        m.operator.diagonal(&mut diagonal);
+        for site in [0, n / 3, n / 2, n - 1] {
+            for c in 0..3 {
+                let mut unit = vec![[0.0; 3]; n];
+                unit[site][c] = 1.0;
+                let entry = applied(&*m.operator, &unit)[site][c];
+                assert!(
+                    (entry - diagonal[site][c]).abs() < 1e-12 * largest(&diagonal),
+                    "{} {site} {c}",
+                    m.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    for m in models() {
+        let solved = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| {
+                let mut u = random_field(m.positions.len(), 7);
+                let mut held = Held::none(u.len());
+                (0..40).for_each(|s| (0..3).for_each(|c| held.hold(s, c)));
+                let operator = Shared(&*m.operator);
+                let jacobi = Jacobi::new(&Constrained {
+                    inner: &operator,
+                    held: &held,
+                });
+                let params = CgParams {
+                    max_iterations: 30,
+                    energy_tolerance: 0.0,
+                    ..CgParams::default()
+                };
+                minimise(&operator, &held, &jacobi, &mut u, &params, |_| ());
+                u
+            })
+        };
+        assert_eq!(solved(1), solved(3), "{}", m.name);
+    }
+}
+
+/// A borrowed row as an operator of known size.
+struct Shared<'a>(&'a dyn Operator<3>);
+
+impl Operator<3> for Shared<'_> {
+    fn sites(&self) -> usize {
+        self.0.sites()
+    }
+    fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        self.0.apply(x, y);
+    }
+    fn diagonal(&self, d: &mut [[f64; 3]]) {
+        self.0.diagonal(d);
+    }
+}

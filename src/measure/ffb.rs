@@ -32,7 +32,7 @@ fn are_a_pair(a: &Row, b: &Row) -> bool {
 }
 
 /// The row without what only its boundary and its solve decide.
-fn settings_of(row: &Row) -> Row {
+pub fn settings_of(row: &Row) -> Row {
     Row {
         boundary: None,
         sites: None,

@@ -1,10 +1,13 @@
 //! Owns `lattice` on disk: builds the lattices of a segmented scan, reports their counts, exports them.
 
-use crate::error::Result;
-use crate::run::not_available;
+use crate::error::{Error, Result};
+use crate::grid::Axis;
+use crate::io::{atomic, lammps, vtk};
+use crate::run::segment::load;
 use crate::run::session::Session;
-use crate::stage::lattice::LatticeParams;
-use serde::Serialize;
+use crate::stage::lattice::{Case, LatticeParams, LatticeSummary, build, summarise};
+use crate::topology::sites::Sites;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// A format for other programs.
@@ -14,22 +17,78 @@ pub enum Export {
     Vtk,
 }
 
-/// Counts of one lattice.
-#[derive(Debug, Clone, Serialize)]
-pub struct LatticeSummary {}
+/// `lattice.json`: the settings `solve` finds there, and what they came to.
+#[derive(Debug, Serialize, Deserialize)]
+struct Record {
+    version: String,
+    settings: LatticeParams,
+    lattices: Vec<LatticeSummary>,
+}
 
-/// Builds every lattice asked for from the mask in `dir`, writes `dir/lattice.json` (settings and counts) and one file
-/// per lattice and export format.
+const RECORD: &str = "lattice.json";
+
+/// Builds every lattice asked for from the mask in `dir`, with the end planes along z gripped, writes `dir/lattice.json`
+/// (settings and counts) and one file per lattice and export format.
 pub fn lattice(
-    _dir: &Path,
-    _params: &LatticeParams,
-    _exports: &[Export],
-    _session: &Session,
+    dir: &Path,
+    params: &LatticeParams,
+    exports: &[Export],
+    session: &Session,
 ) -> Result<Vec<LatticeSummary>> {
-    Err(not_available("lattice"))
+    params.check()?;
+    let specimen = load(dir)?;
+    let mut lattices = Vec::new();
+    for case in params.cases() {
+        let sites = build(&specimen, &case, Axis::Z, 0.0)?;
+        let summary = summarise(&specimen, &case, &sites);
+        session.say(summary.in_words());
+        lattices.push(summary);
+        if !session.dry_run {
+            export(dir, &case, &sites, exports)?;
+        }
+    }
+    if !session.dry_run {
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        let record = Record {
+            version,
+            settings: params.clone(),
+            lattices: lattices.clone(),
+        };
+        let text = serde_json::to_string_pretty(&record).expect("plain data");
+        atomic::write(&dir.join(RECORD), text)?;
+    }
+    Ok(lattices)
+}
+
+fn export(dir: &Path, case: &Case, sites: &Sites, exports: &[Export]) -> Result<()> {
+    let name = format!(
+        "lattice-{}-{}-{}",
+        case.structure.name(),
+        case.boundary.name(),
+        case.lp_mm
+    );
+    for format in exports {
+        match format {
+            Export::Lammps => lammps::write(&dir.join(format!("{name}.data")), sites)?,
+            Export::Vtk => vtk::write_lattice(&dir.join(format!("{name}.vtk")), sites)?,
+        }
+    }
+    Ok(())
 }
 
 /// The settings that `lattice` left in `dir`; the defaults where it was not run.
-pub fn settings(_dir: &Path) -> Result<LatticeParams> {
-    Ok(LatticeParams::default())
+///
+/// # Errors
+/// A `lattice.json` that cannot be read.
+pub fn settings(dir: &Path) -> Result<LatticeParams> {
+    let path = dir.join(RECORD);
+    if !path.exists() {
+        return Ok(LatticeParams::default());
+    }
+    let again = "run `bonepd-ct lattice` again, or delete the file";
+    let text = std::fs::read(&path)
+        .map_err(|e| Error::file(&path, format!("cannot be read: {e}"), again))?;
+    let record: Record = serde_json::from_slice(&text)
+        .map_err(|e| Error::file(&path, format!("not a lattice record: {e}"), again))?;
+    Ok(record.settings)
 }

@@ -3,8 +3,10 @@
 pub mod cohort;
 pub mod info;
 pub mod lattice;
+pub mod meter;
 pub mod phantom;
 pub mod report;
+pub mod results;
 pub mod scene;
 pub mod segment;
 pub mod session;

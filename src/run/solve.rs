@@ -1,20 +1,100 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
 use crate::error::Result;
+use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
-use crate::run::not_available;
+use crate::run::meter::Meter;
+use crate::run::results::Results;
+use crate::run::segment::load;
 use crate::run::session::Session;
-use crate::stage::lattice::LatticeParams;
+use crate::solve::cg::CgStep;
+use crate::stage::lattice::{Case, LatticeParams};
 use crate::stage::solve::SolveParams;
+use crate::stage::solve::lattice::{label, solve_lattice};
+use crate::volume::Specimen;
+use indicatif::ProgressBar;
 use std::path::Path;
 
 /// Solves every structure × lattice parameter × boundary for the specimen in `dir`. Rows already there for the same
 /// mask and settings are kept unless the session forces.
+///
+/// # Errors
+/// A folder that is not a segmented scan, settings that do not fit it, an unwritable folder. Not converging is no error:
+/// the row says so.
 pub fn solve(
-    _dir: &Path,
-    _lattice: &LatticeParams,
-    _params: &SolveParams,
-    _session: &Session,
+    dir: &Path,
+    lattice: &LatticeParams,
+    params: &SolveParams,
+    session: &Session,
 ) -> Result<Vec<Row>> {
-    Err(not_available("solve"))
+    lattice.check()?;
+    params.check()?;
+    let specimen = load(dir)?;
+    let mut results = Results::open(dir, session.force)?;
+    let mut rows = Vec::new();
+    for case in lattice.cases() {
+        let row = match results.find(&blank(&specimen, &case, params)) {
+            Some(row) => row,
+            None if session.dry_run => continue,
+            None => solve_case(&specimen, &case, params, session)?,
+        };
+        session.say(in_words(&row));
+        results.keep(&row)?;
+        rows.push(row);
+    }
+    Ok(with_ffb(&rows))
+}
+
+/// The row of a solve before it is made: its settings.
+fn blank(specimen: &Specimen, case: &Case, params: &SolveParams) -> Row {
+    label(params.row(specimen), case)
+}
+
+fn solve_case(
+    specimen: &Specimen,
+    case: &Case,
+    params: &SolveParams,
+    session: &Session,
+) -> Result<Row> {
+    let meter = Meter::start();
+    let bar = session.bar(1000, &format!("{} {} mm", case.boundary.name(), case.lp_mm));
+    let solved = solve_lattice(specimen, case, params, |step| {
+        show(&bar, step, params.tolerance)
+    })?;
+    bar.finish_and_clear();
+    let row = label(solved.row(params.row(specimen)), case);
+    Ok(Row {
+        wall_s: Some(meter.wall_s()),
+        peak_mib: meter.peak_mib(),
+        ..row
+    })
+}
+
+/// Progress is the share of the error's decades already gained.
+fn show(bar: &ProgressBar, step: CgStep, tolerance: f64) {
+    if let Some(error) = step.energy_error.filter(|e| *e > 0.0) {
+        let gained = (error.log10() / tolerance.log10()).clamp(0.0, 1.0);
+        bar.set_position((1000.0 * gained) as u64);
+        bar.set_message(format!("iteration {}, error {:.1e}", step.iteration, error));
+    }
+}
+
+fn in_words(row: &Row) -> String {
+    let number = |v: Option<f64>, digits: usize| v.map_or("NA".into(), |v| format!("{v:.digits$}"));
+    let note = row
+        .note
+        .as_ref()
+        .map_or(String::new(), |n| format!("  ({n})"));
+    format!(
+        "{} {:<8} {:<7} {:>6} mm  E_app {:>9} MPa ± {:<7} {:>9} sites {:>6} iterations {:>7} s{note}",
+        row.scan,
+        row.structure,
+        row.boundary.as_deref().unwrap_or("NA"),
+        row.lp_mm,
+        number(row.e_app_mpa, 3),
+        number(row.algebraic_error_mpa, 3),
+        row.sites.unwrap_or(0),
+        row.iterations.unwrap_or(0),
+        number(row.wall_s, 2),
+    )
 }

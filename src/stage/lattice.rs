@@ -158,3 +158,20 @@ pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSumm
         lattice_bv_tv: whole * sites.cell_mm3() / specimen.tv_mm3,
     }
 }
+
+impl LatticeSummary {
+    /// One line for a person.
+    pub fn in_words(&self) -> String {
+        format!(
+            "{} {:<7} {:>6} mm  {:>9} sites  {:>10} bonds  {:>9} fully coordinated  {:>6} dropped  lattice BV/TV {:.4}",
+            self.structure.name(),
+            self.boundary.name(),
+            self.lp_mm,
+            self.sites,
+            self.bonds,
+            self.fully_coordinated_sites,
+            self.dropped_sites,
+            self.lattice_bv_tv,
+        )
+    }
+}

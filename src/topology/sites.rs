@@ -93,6 +93,12 @@ impl Sites {
         self.indices.is_empty()
     }
 
+    /// Neighbours of a site, one per bond of the stencil; a missing one is the site itself.
+    pub fn neighbours_of(&self, site: usize) -> &[u32] {
+        let z = self.neighbours.len() / self.len();
+        &self.neighbours[site * z..(site + 1) * z]
+    }
+
     /// Index of a site's plane along the load axis.
     pub fn plane(&self, site: usize) -> i32 {
         self.indices[site][self.frame.axis.index()]

@@ -1,0 +1,45 @@
+//! Owns the clock and the memory meter.
+
+use std::time::Instant;
+
+/// Wall time since its start, and the process's memory high-water mark.
+pub struct Meter(Instant);
+
+impl Meter {
+    pub fn start() -> Self {
+        Meter(Instant::now())
+    }
+
+    pub fn wall_s(&self) -> f64 {
+        self.0.elapsed().as_secs_f64()
+    }
+
+    /// The largest resident memory the process has had so far, in MiB; None where the system does not tell.
+    pub fn peak_mib(&self) -> Option<f64> {
+        peak_bytes().map(|b| b / (1024.0 * 1024.0))
+    }
+}
+
+#[cfg(unix)]
+fn peak_bytes() -> Option<f64> {
+    let mut usage = std::mem::MaybeUninit::<libc::rusage>::zeroed();
+    // SAFETY: the pointer is valid for writes of one `rusage`, and all-zero bytes are a valid `rusage`.
+    let usage = unsafe {
+        if libc::getrusage(libc::RUSAGE_SELF, usage.as_mut_ptr()) != 0 {
+            return None;
+        }
+        usage.assume_init()
+    };
+    // Linux counts in KiB, Apple's systems in bytes.
+    let unit = if cfg!(target_vendor = "apple") {
+        1.0
+    } else {
+        1024.0
+    };
+    Some(usage.ru_maxrss as f64 * unit)
+}
+
+#[cfg(not(unix))]
+fn peak_bytes() -> Option<f64> {
+    None
+}

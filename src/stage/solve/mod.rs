@@ -1,0 +1,146 @@
+//! Owns the solve stage: material, load, supports and accuracy in, apparent moduli out.
+
+pub mod lattice;
+pub mod solved;
+
+use crate::error::{Error, Result};
+use crate::grid::Axis;
+use serde::{Deserialize, Serialize};
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    #[default]
+    Lattice,
+    VoxelFe,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum Load {
+    #[default]
+    Uniaxial,
+    /// Sides held against lateral motion.
+    Confined,
+    /// All six unit strains: the apparent stiffness matrix.
+    Stiffness,
+}
+
+impl Load {
+    pub fn name(self) -> &'static str {
+        match self {
+            Load::Uniaxial => "uniaxial",
+            Load::Confined => "confined",
+            Load::Stiffness => "stiffness",
+        }
+    }
+}
+
+/// What the gripped sites may do sideways.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum Ends {
+    #[default]
+    Free,
+    Bonded,
+}
+
+impl Ends {
+    pub fn name(self) -> &'static str {
+        match self {
+            Ends::Free => "free",
+            Ends::Bonded => "bonded",
+        }
+    }
+}
+
+/// Settings of `solve`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolveParams {
+    pub method: Method,
+    pub young_mpa: f64,
+    pub poisson: f64,
+    /// Nominal strain u / L_g; negative is compression.
+    pub strain: f64,
+    /// Thickness of each grip; 0: the end planes.
+    pub grip_mm: f64,
+    pub load: Load,
+    pub ends: Ends,
+    pub axis: Axis,
+    /// Relative algebraic error allowed in the headline modulus (0.001 is 0.1 %).
+    pub tolerance: f64,
+    pub max_iterations: usize,
+}
+
+impl Default for SolveParams {
+    fn default() -> Self {
+        SolveParams {
+            method: Method::Lattice,
+            young_mpa: 1000.0,
+            poisson: 0.3,
+            strain: -0.01,
+            grip_mm: 0.0,
+            load: Load::Uniaxial,
+            ends: Ends::Free,
+            axis: Axis::Z,
+            tolerance: 1e-3,
+            max_iterations: 200_000,
+        }
+    }
+}
+
+impl SolveParams {
+    /// Refuses what is no elastic material, no load or no accuracy.
+    pub fn check(&self) -> Result<()> {
+        let rules = [
+            (
+                "solve.young_mpa",
+                self.young_mpa,
+                self.young_mpa > 0.0,
+                "a modulus in MPa above 0 (the paper: 1000)",
+            ),
+            (
+                "solve.poisson",
+                self.poisson,
+                self.poisson > -1.0 && self.poisson < 0.5,
+                "a ratio above -1 and below 0.5 (bone: 0.3; at 0.5 the material is incompressible and has no stiffness matrix)",
+            ),
+            (
+                "solve.strain",
+                self.strain,
+                self.strain != 0.0,
+                "a strain other than 0; negative is compression (the paper: -0.0042)",
+            ),
+            (
+                "solve.grip_mm",
+                self.grip_mm,
+                self.grip_mm >= 0.0,
+                "a thickness in mm; 0 grips the end planes (the paper: 0.6)",
+            ),
+            (
+                "solve.tolerance",
+                self.tolerance,
+                self.tolerance > 0.0 && self.tolerance < 1.0,
+                "a relative error between 0 and 1 (0.001 is 0.1 %)",
+            ),
+        ];
+        for (key, value, ok, expected) in rules {
+            if !ok || !value.is_finite() {
+                return Err(Error::setting(
+                    key,
+                    format!("not usable: {value}"),
+                    format!("give {expected}"),
+                ));
+            }
+        }
+        if self.max_iterations == 0 {
+            return Err(Error::setting(
+                "solve.max_iterations",
+                "0 iterations solve nothing",
+                "give 1 or more",
+            ));
+        }
+        Ok(())
+    }
+}

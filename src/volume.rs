@@ -26,6 +26,27 @@ impl<T> Volume<T> {
         }
     }
 
+    /// The voxels `crop[a][0]..crop[a][1]` along each axis, as a volume of its own at its place in the world.
+    ///
+    /// # Panics
+    /// If the crop does not lie in the grid (a bug in the caller, not bad input).
+    pub fn cropped(&self, crop: &[[usize; 2]; 3]) -> Volume<T>
+    where
+        T: Copy,
+    {
+        let [x, y, z] = crop.map(|[from, to]| from..to);
+        let grid = Grid::new([x.len(), y.len(), z.len()], self.grid.spacing_mm);
+        let part = self.values.slice(ndarray::s![z.clone(), y.clone(), x.clone()]);
+        let mut cropped = Volume::from_vec(grid, part.iter().copied().collect());
+        cropped.affine = self.affine.map(|rows| {
+            rows.map(|[a, b, c, o]| {
+                let corner = a * x.start as f64 + b * y.start as f64 + c * z.start as f64;
+                [a, b, c, o + corner]
+            })
+        });
+        cropped
+    }
+
     /// All values, x fastest.
     pub fn as_slice(&self) -> &[T] {
         self.values

@@ -1,6 +1,13 @@
-//! Files: one format a file.
+//! Files: one format a file. [`scan`] is the way in, [`specimen`] the segmented scan on disk, [`atomic`] the way out.
 
 pub mod atomic;
 pub mod lammps;
 pub mod table;
 pub mod vtk;
+pub mod nifti;
+pub mod orient;
+pub mod raw;
+pub mod scan;
+pub mod slices;
+pub mod table;
+pub mod tiff;

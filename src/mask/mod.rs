@@ -1,1 +1,6 @@
-//! See the table in the crate's root.
+//! From grey values to bone: smoothing, thresholds, volumes of interest, connected components.
+
+pub mod components;
+pub mod gaussian;
+pub mod threshold;
+pub mod voi;

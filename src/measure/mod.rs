@@ -3,3 +3,4 @@
 pub mod apparent;
 pub mod ffb;
 pub mod row;
+pub mod thickness;

@@ -1,4 +1,4 @@
-//! Owns segmentation: crop, smooth, threshold, volume of interest, connectivity, in that order.
+//! Owns the settings of segmentation, and which of them contradict each other.
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -40,6 +40,9 @@ pub struct SegmentParams {
     pub keep_all: bool,
 }
 
+/// Wider smoothing than this removes any trabecula.
+const MAX_SIGMA: f64 = 20.0;
+
 impl SegmentParams {
     /// Refuses settings that contradict each other or cannot be used on any scan.
     pub fn check(&self) -> Result<()> {
@@ -61,11 +64,11 @@ impl SegmentParams {
                 "swap them",
             );
         }
-        if !(self.gaussian_voxels >= 0.0 && self.gaussian_voxels.is_finite()) {
+        if !(0.0..=MAX_SIGMA).contains(&self.gaussian_voxels) {
             return refuse(
                 "segment.gaussian_voxels",
                 format!(
-                    "expected a width of 0 or more voxels, found {}",
+                    "expected a width of 0 to {MAX_SIGMA} voxels, found {}",
                     self.gaussian_voxels
                 ),
                 "0 is off; 0.5 to 1.2 is usual",

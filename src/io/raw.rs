@@ -1,0 +1,200 @@
+//! Owns the decoding of raw voxel streams: any scalar type and byte order to `f32`, with slope and intercept.
+//!
+//! Sizes in headers are not believed: what a file cannot hold is refused before memory is taken.
+
+use crate::error::{Error, Result};
+use std::io::Read;
+use std::path::Path;
+
+/// How one voxel is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scalar {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    pub fn bytes(self) -> usize {
+        match self {
+            Scalar::U8 | Scalar::I8 => 1,
+            Scalar::U16 | Scalar::I16 => 2,
+            Scalar::U32 | Scalar::I32 | Scalar::F32 => 4,
+            Scalar::U64 | Scalar::I64 | Scalar::F64 => 8,
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Scalar::U8 => "uint8",
+            Scalar::I8 => "int8",
+            Scalar::U16 => "uint16",
+            Scalar::I16 => "int16",
+            Scalar::U32 => "uint32",
+            Scalar::I32 => "int32",
+            Scalar::U64 => "uint64",
+            Scalar::I64 => "int64",
+            Scalar::F32 => "float32",
+            Scalar::F64 => "float64",
+        }
+    }
+}
+
+/// What follows a header: `n` voxels, x fastest; a stored `v` means `slope · v + intercept`.
+#[derive(Debug, Clone, Copy)]
+pub struct Layout {
+    pub scalar: Scalar,
+    pub big_endian: bool,
+    pub n: [usize; 3],
+    pub slope: f64,
+    pub intercept: f64,
+}
+
+impl Layout {
+    /// Number of voxels and of bytes, or None where they overflow.
+    pub fn sizes(&self) -> Option<(usize, usize)> {
+        let voxels = self
+            .n
+            .iter()
+            .try_fold(1usize, |product, &n| product.checked_mul(n))?;
+        Some((voxels, voxels.checked_mul(self.scalar.bytes())?))
+    }
+}
+
+/// The most that deflate can expand (1032), rounded up. A header that asks for more than this many times its file's
+/// size is lying.
+pub const MAX_EXPANSION: u64 = 1100;
+
+/// Reads all voxels of `layout`. `file_bytes` is the size on disk of what holds them, `compressed` whether it may
+/// expand.
+pub fn read(
+    source: &mut dyn Read,
+    layout: &Layout,
+    path: &Path,
+    file_bytes: u64,
+    compressed: bool,
+) -> Result<Vec<f32>> {
+    let [nx, ny, nz] = layout.n;
+    let believable = file_bytes.saturating_mul(if compressed { MAX_EXPANSION } else { 1 });
+    let (voxels, bytes) = match layout.sizes() {
+        Some((voxels, bytes)) if voxels > 0 && bytes as u64 <= believable => (voxels, bytes),
+        _ => {
+            return Err(Error::file(
+                path,
+                format!(
+                    "the header promises {nx} × {ny} × {nz} voxels of {}, but the file holds only {file_bytes} bytes",
+                    layout.scalar.name()
+                ),
+                "the file is truncated or damaged: copy or export it again",
+            ));
+        }
+    };
+    let mut values = Vec::new();
+    values.try_reserve_exact(voxels).map_err(|_| {
+        Error::file(
+            path,
+            format!("{nx} × {ny} × {nz} voxels do not fit in this machine's memory"),
+            "use a machine with more memory, or cut the scan first",
+        )
+    })?;
+    let mut chunk = vec![0u8; (1 << 20).min(bytes)];
+    let mut left = bytes;
+    while left > 0 {
+        let part = left.min(chunk.len());
+        source.read_exact(&mut chunk[..part]).map_err(|e| {
+            let at = bytes - left;
+            Error::file(
+                path,
+                format!("voxel data end or break off after {at} of {bytes} bytes ({e})"),
+                "the file is truncated or damaged: copy or export it again",
+            )
+        })?;
+        decode(&chunk[..part], layout, &mut values);
+        left -= part;
+    }
+    Ok(values)
+}
+
+/// Appends the voxels in `bytes` (a whole number of them).
+pub fn decode(bytes: &[u8], layout: &Layout, out: &mut Vec<f32>) {
+    macro_rules! of {
+        ($t:ty) => {{
+            const N: usize = std::mem::size_of::<$t>();
+            let identity = layout.slope == 1.0 && layout.intercept == 0.0;
+            let (a, b) = (layout.slope, layout.intercept);
+            let each = bytes.chunks_exact(N).map(|c| {
+                let raw: [u8; N] = c.try_into().expect("chunks of this size");
+                if layout.big_endian {
+                    <$t>::from_be_bytes(raw)
+                } else {
+                    <$t>::from_le_bytes(raw)
+                }
+            });
+            if identity {
+                out.extend(each.map(|v| v as f32));
+            } else {
+                out.extend(each.map(|v| (a * v as f64 + b) as f32));
+            }
+        }};
+    }
+    match layout.scalar {
+        Scalar::U8 => of!(u8),
+        Scalar::I8 => of!(i8),
+        Scalar::U16 => of!(u16),
+        Scalar::I16 => of!(i16),
+        Scalar::U32 => of!(u32),
+        Scalar::I32 => of!(i32),
+        Scalar::U64 => of!(u64),
+        Scalar::I64 => of!(i64),
+        Scalar::F32 => of!(f32),
+        Scalar::F64 => of!(f64),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout(scalar: Scalar, big_endian: bool, n: [usize; 3]) -> Layout {
+        Layout {
+            scalar,
+            big_endian,
+            n,
+            slope: 1.0,
+            intercept: 0.0,
+        }
+    }
+
+    #[test]
+    fn byte_order_and_scaling_are_applied() {
+        let mut l = layout(Scalar::I16, true, [2, 1, 1]);
+        l.slope = 0.5;
+        l.intercept = 10.0;
+        let v = read(&mut &[0xFF, 0xFE, 0x01, 0x00][..], &l, Path::new("x"), 4, false).unwrap();
+        assert_eq!(v, [9.0, 138.0]);
+    }
+
+    #[test]
+    fn a_header_that_lies_about_its_size_is_refused_before_memory_is_taken() {
+        let path = Path::new("liar.raw");
+        for n in [[70_000, 70_000, 70_000], [usize::MAX, 2, 1], [0, 4, 4]] {
+            let l = layout(Scalar::F64, false, n);
+            let e = read(&mut &[0u8; 100][..], &l, path, 100, true).unwrap_err();
+            assert!(e.to_string().contains("promises"), "{e}");
+        }
+    }
+
+    #[test]
+    fn truncation_says_where() {
+        let l = layout(Scalar::U8, false, [10, 10, 10]);
+        let e = read(&mut &[0u8; 999][..], &l, Path::new("t"), 1000, false).unwrap_err();
+        assert!(e.to_string().contains("of 1000 bytes"), "{e}");
+    }
+}

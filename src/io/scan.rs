@@ -1,0 +1,196 @@
+//! Owns the one way in: any scan, file or folder, to grey values on a grid in millimetres.
+
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::io::orient::{self, Affine};
+use crate::io::{nifti, slices, tiff};
+use crate::volume::Volume;
+use std::path::{Path, PathBuf};
+
+/// What a reader found in a file, axes as stored.
+#[derive(Debug, Clone, Default)]
+pub struct Stored {
+    /// Format and storage type, as `NIfTI-1 (gzip), int16`.
+    pub format: String,
+    pub n: [usize; 3],
+    /// x fastest.
+    pub values: Vec<f32>,
+    /// None where the file does not say.
+    pub spacing_mm: Option<[f64; 3]>,
+    /// None where the file has no orientation.
+    pub affine: Option<Affine>,
+    /// Unit of the grey values where known: `HU`, `mg HA/cm3`.
+    pub unit: Option<String>,
+    /// Further facts for `info`, key and value. Never names of persons.
+    pub details: Vec<(String, String)>,
+    pub notes: Vec<String>,
+}
+
+/// A scan, ready to be segmented.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    /// The file's or folder's name without extensions.
+    pub name: String,
+    pub path: PathBuf,
+    pub format: String,
+    pub unit: Option<String>,
+    /// Axes x, y, z canonical where the file has an orientation, else as stored. May hold NaN and infinities.
+    pub volume: Volume<f32>,
+    pub details: Vec<(String, String)>,
+    /// What a user should know of how the file was understood.
+    pub notes: Vec<String>,
+}
+
+/// Reads a scan. `spacing_mm` (x, y, z of the canonical axes) overrides the file's voxel size.
+pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
+    let stored = stored(path)?;
+    let mut notes = stored.notes;
+    let found = stored.spacing_mm.filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));
+    let Some(spacing) = found.or(spacing_mm) else {
+        return Err(Error::file(
+            path,
+            format!("{} without a voxel size: the file does not carry one", stored.format),
+            "give it with --spacing MM (for example --spacing 0.0195)",
+        ));
+    };
+    let grid = Grid::new(stored.n, spacing);
+    let mut volume = match stored.affine {
+        Some(affine) => orient::canonical(grid, stored.values, affine, &mut notes),
+        None => Volume::from_vec(grid, stored.values),
+    };
+    if let Some(wanted) = spacing_mm {
+        respace(&mut volume, checked_spacing(wanted)?, found.is_some(), &mut notes);
+    }
+    Ok(Scan {
+        name: name(path),
+        path: path.to_path_buf(),
+        format: stored.format,
+        unit: stored.unit,
+        volume,
+        details: stored.details,
+        notes,
+    })
+}
+
+fn stored(path: &Path) -> Result<Stored> {
+    let meta = std::fs::metadata(path).map_err(|e| {
+        Error::file(path, format!("cannot be read: {e}"), "check the path and its permissions")
+    })?;
+    if meta.is_dir() {
+        return slices::read(path);
+    }
+    match kind(path) {
+        Some(Kind::Nifti) => nifti::read(path),
+        Some(Kind::Tiff) => tiff::read(path),
+        None => Err(Error::file(
+            path,
+            "is not a scan format that is read",
+            "give a NIfTI file, a TIFF stack, or a folder of slices",
+        )),
+    }
+}
+
+/// Formats that are one file each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Nifti,
+    Tiff,
+}
+
+fn kind(path: &Path) -> Option<Kind> {
+    let name = path.file_name()?.to_string_lossy().to_lowercase();
+    let ends = |list: &[&str]| list.iter().any(|e| name.ends_with(e));
+    if ends(&[".nii", ".nii.gz", ".hdr", ".hdr.gz"]) {
+        Some(Kind::Nifti)
+    } else if ends(&[".tif", ".tiff"]) {
+        Some(Kind::Tiff)
+    } else {
+        None
+    }
+}
+
+/// True for what [`read`] takes as one file (by its name; the content may still be refused).
+pub fn is_scan_file(path: &Path) -> bool {
+    path.is_file() && kind(path).is_some()
+}
+
+fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {
+    if s.iter().all(|&v| v.is_finite() && v > 0.0) {
+        return Ok(s);
+    }
+    Err(Error::setting(
+        "spacing",
+        format!("{s:?} is no voxel size"),
+        "give millimetres above zero, one for all axes or three",
+    ))
+}
+
+fn respace(volume: &mut Volume<f32>, wanted: [f64; 3], known: bool, notes: &mut Vec<String>) {
+    let old = volume.grid.spacing_mm;
+    if known && (0..3).any(|a| (old[a] / wanted[a] - 1.0).abs() > 1e-3) {
+        notes.push(format!("voxel size {old:?} mm of the file replaced by {wanted:?} mm as asked"));
+    }
+    if let Some(affine) = &mut volume.affine {
+        for row in affine {
+            for a in 0..3 {
+                row[a] *= wanted[a] / old[a];
+            }
+        }
+    }
+    volume.grid.spacing_mm = wanted;
+}
+
+/// The scan's name: that of the file or folder, without extensions that formats add.
+pub fn name(path: &Path) -> String {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let full = absolute
+        .file_name()
+        .map_or_else(|| "scan".into(), |n| n.to_string_lossy().into_owned());
+    if path.is_dir() {
+        return full;
+    }
+    let stem = full.strip_suffix(".gz").unwrap_or(&full);
+    match stem.rfind('.') {
+        Some(dot) if dot > 0 => stem[..dot].to_string(),
+        _ => stem.to_string(),
+    }
+}
+
+/// BLAKE3 of the input: of the file, or of the names and contents of a folder's files in natural order.
+pub fn hash(path: &Path) -> Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    if path.is_dir() {
+        for file in slices::files(path)? {
+            let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            hasher.update(name.as_bytes());
+            hasher.update(hash_file(&file)?.as_bytes());
+        }
+    } else {
+        return Ok(hash_file(path)?.to_hex().to_string());
+    }
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+fn hash_file(path: &Path) -> Result<blake3::Hash> {
+    let mut hasher = blake3::Hasher::new();
+    std::fs::File::open(path)
+        .and_then(|file| hasher.update_reader(file).map(|h| h.finalize()))
+        .map_err(|e| Error::file(path, format!("cannot be read: {e}"), "check the path and its permissions"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lose_only_format_extensions() {
+        for (path, expected) in [
+            ("a/b/femur_01.nii.gz", "femur_01"),
+            ("scan.0195.nii", "scan.0195"),
+            ("stack.tif", "stack"),
+            ("folder", "folder"),
+        ] {
+            assert_eq!(name(Path::new(path)), expected);
+        }
+    }
+}

@@ -36,7 +36,9 @@ impl<T> Volume<T> {
     {
         let [x, y, z] = crop.map(|[from, to]| from..to);
         let grid = Grid::new([x.len(), y.len(), z.len()], self.grid.spacing_mm);
-        let part = self.values.slice(ndarray::s![z.clone(), y.clone(), x.clone()]);
+        let part = self
+            .values
+            .slice(ndarray::s![z.clone(), y.clone(), x.clone()]);
         let mut cropped = Volume::from_vec(grid, part.iter().copied().collect());
         cropped.affine = self.affine.map(|rows| {
             rows.map(|[a, b, c, o]| {

@@ -18,7 +18,11 @@ pub fn read(path: &Path) -> Result<Stored> {
     let (mut source, file_bytes, compressed) = open(path)?;
     let mut head = [0u8; 348];
     source.read_exact(&mut head).map_err(|e| {
-        Error::file(path, format!("its NIfTI header of 348 bytes is incomplete ({e})"), DAMAGED)
+        Error::file(
+            path,
+            format!("its NIfTI header of 348 bytes is incomplete ({e})"),
+            DAMAGED,
+        )
     })?;
     let header = parse(&head, path)?;
     let n = dimensions(&header, path)?;
@@ -27,8 +31,16 @@ pub fn read(path: &Path) -> Result<Stored> {
         scalar: scalar(&header, path)?,
         big_endian: header.endianness == nifti::Endianness::Big,
         n,
-        slope: if scaled { decimal(header.scl_slope) } else { 1.0 },
-        intercept: if scaled && header.scl_inter.is_finite() { decimal(header.scl_inter) } else { 0.0 },
+        slope: if scaled {
+            decimal(header.scl_slope)
+        } else {
+            1.0
+        },
+        intercept: if scaled && header.scl_inter.is_finite() {
+            decimal(header.scl_inter)
+        } else {
+            0.0
+        },
     };
     let pair = &header.magic == b"ni1\0";
     let values = if pair {
@@ -37,7 +49,10 @@ pub fn read(path: &Path) -> Result<Stored> {
         skip(&mut source, header.vox_offset.max(0.0) as u64);
         raw::read(&mut source, &layout, &image, file_bytes, compressed)?
     } else {
-        skip(&mut source, (header.vox_offset.max(0.0) as u64).saturating_sub(348));
+        skip(
+            &mut source,
+            (header.vox_offset.max(0.0) as u64).saturating_sub(348),
+        );
         raw::read(&mut source, &layout, path, file_bytes, compressed)?
     };
     let mut notes = Vec::new();
@@ -45,7 +60,11 @@ pub fn read(path: &Path) -> Result<Stored> {
     let affine = affine(&header).map(|a| a.map(|row| row.map(|v| v * to_mm)));
     let spacing_mm = spacing(&header, affine.as_ref(), to_mm, &mut notes);
     Ok(Stored {
-        format: format!("NIfTI-1{}, {}", if compressed { " (gzip)" } else { "" }, layout.scalar.name()),
+        format: format!(
+            "NIfTI-1{}, {}",
+            if compressed { " (gzip)" } else { "" },
+            layout.scalar.name()
+        ),
         n,
         values,
         spacing_mm,
@@ -59,15 +78,26 @@ type Source = Box<dyn Read>;
 
 fn open(path: &Path) -> Result<(Source, u64, bool)> {
     let unreadable = |e: std::io::Error| {
-        Error::file(path, format!("cannot be read: {e}"), "check the path and its permissions")
+        Error::file(
+            path,
+            format!("cannot be read: {e}"),
+            "check the path and its permissions",
+        )
     };
     let mut file = File::open(path).map_err(unreadable)?;
     let file_bytes = file.metadata().map_err(unreadable)?.len();
     let mut magic = Vec::new();
-    Read::by_ref(&mut file).take(2).read_to_end(&mut magic).map_err(unreadable)?;
+    Read::by_ref(&mut file)
+        .take(2)
+        .read_to_end(&mut magic)
+        .map_err(unreadable)?;
     let compressed = magic == [0x1f, 0x8b];
     let start = BufReader::with_capacity(1 << 18, std::io::Cursor::new(magic).chain(file));
-    let source: Source = if compressed { Box::new(MultiGzDecoder::new(start)) } else { Box::new(start) };
+    let source: Source = if compressed {
+        Box::new(MultiGzDecoder::new(start))
+    } else {
+        Box::new(start)
+    };
     Ok((source, file_bytes, compressed))
 }
 
@@ -75,7 +105,11 @@ fn open(path: &Path) -> Result<(Source, u64, bool)> {
 fn image_of(path: &Path) -> PathBuf {
     let plain = path.with_extension("").with_extension("img");
     let gz = path.with_extension("").with_extension("img.gz");
-    if plain.exists() || !gz.exists() { plain } else { gz }
+    if plain.exists() || !gz.exists() {
+        plain
+    } else {
+        gz
+    }
 }
 
 /// Passes over `bytes`; where the stream ends before, the voxels are found missing.
@@ -86,14 +120,21 @@ fn skip(source: &mut Source, bytes: u64) {
 fn parse(head: &[u8; 348], path: &Path) -> Result<NiftiHeader> {
     let size = i32::from_le_bytes([head[0], head[1], head[2], head[3]]);
     if size == 540 || size == i32::from_be(540) {
-        return Err(Error::file(path, "is NIfTI-2, which is not read", "save it as NIfTI-1 (sides up to 32767 voxels)"));
+        return Err(Error::file(
+            path,
+            "is NIfTI-2, which is not read",
+            "save it as NIfTI-1 (sides up to 32767 voxels)",
+        ));
     }
     let header = NiftiHeader::from_reader(&head[..])
         .map_err(|e| Error::file(path, format!("is no NIfTI-1 file ({e})"), DAMAGED))?;
     if header.sizeof_hdr != 348 {
         return Err(Error::file(
             path,
-            format!("is no NIfTI-1 file: the header should say 348 bytes, it says {}", header.sizeof_hdr),
+            format!(
+                "is no NIfTI-1 file: the header should say 348 bytes, it says {}",
+                header.sizeof_hdr
+            ),
             DAMAGED,
         ));
     }
@@ -101,17 +142,26 @@ fn parse(head: &[u8; 348], path: &Path) -> Result<NiftiHeader> {
 }
 
 fn dimensions(header: &NiftiHeader, path: &Path) -> Result<[usize; 3]> {
-    let dim = header
-        .dim()
-        .map_err(|e| Error::file(path, format!("has unusable dimensions {:?} ({e})", header.dim), DAMAGED))?;
+    let dim = header.dim().map_err(|e| {
+        Error::file(
+            path,
+            format!("has unusable dimensions {:?} ({e})", header.dim),
+            DAMAGED,
+        )
+    })?;
     if dim.iter().skip(3).any(|&d| d > 1) {
         return Err(Error::file(
             path,
-            format!("holds {} dimensions ({dim:?}), one scan has three", dim.len()),
+            format!(
+                "holds {} dimensions ({dim:?}), one scan has three",
+                dim.len()
+            ),
             "extract the volume that you want as a file of its own",
         ));
     }
-    Ok(std::array::from_fn(|a| dim.get(a).map_or(1, |&d| d as usize)))
+    Ok(std::array::from_fn(|a| {
+        dim.get(a).map_or(1, |&d| d as usize)
+    }))
 }
 
 /// Codes of the NIfTI-1 standard, `nifti1.h`.
@@ -130,7 +180,9 @@ fn scalar(header: &NiftiHeader, path: &Path) -> Result<Scalar> {
         code => {
             return Err(Error::file(
                 path,
-                format!("stores voxels as NIfTI type {code}; integers and floats of one number per voxel are read"),
+                format!(
+                    "stores voxels as NIfTI type {code}; integers and floats of one number per voxel are read"
+                ),
                 "convert it to a grey-value type such as int16 or float32",
             ));
         }
@@ -164,7 +216,8 @@ fn affine(h: &NiftiHeader) -> Option<Affine> {
     } else {
         return None;
     };
-    let usable = rows.iter().flatten().all(|v| v.is_finite()) && column_norms(&rows).iter().all(|&l| l > 0.0);
+    let usable = rows.iter().flatten().all(|v| v.is_finite())
+        && column_norms(&rows).iter().all(|&l| l > 0.0);
     usable.then_some(rows)
 }
 
@@ -173,22 +226,52 @@ fn qform(h: &NiftiHeader) -> Affine {
     let [b, c, d] = [h.quatern_b, h.quatern_c, h.quatern_d].map(f64::from);
     let a = (1.0 - b * b - c * c - d * d).max(0.0).sqrt();
     let r = [
-        [a * a + b * b - c * c - d * d, 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)],
-        [2.0 * (b * c + a * d), a * a + c * c - b * b - d * d, 2.0 * (c * d - a * b)],
-        [2.0 * (b * d - a * c), 2.0 * (c * d + a * b), a * a + d * d - b * b - c * c],
+        [
+            a * a + b * b - c * c - d * d,
+            2.0 * (b * c - a * d),
+            2.0 * (b * d + a * c),
+        ],
+        [
+            2.0 * (b * c + a * d),
+            a * a + c * c - b * b - d * d,
+            2.0 * (c * d - a * b),
+        ],
+        [
+            2.0 * (b * d - a * c),
+            2.0 * (c * d + a * b),
+            a * a + d * d - b * b - c * c,
+        ],
     ];
     let qfac = if h.pixdim[0] < 0.0 { -1.0 } else { 1.0 };
-    let scale = [decimal(h.pixdim[1]), decimal(h.pixdim[2]), decimal(h.pixdim[3]) * qfac];
+    let scale = [
+        decimal(h.pixdim[1]),
+        decimal(h.pixdim[2]),
+        decimal(h.pixdim[3]) * qfac,
+    ];
     let offset = [h.quatern_x, h.quatern_y, h.quatern_z].map(decimal);
-    std::array::from_fn(|i| [r[i][0] * scale[0], r[i][1] * scale[1], r[i][2] * scale[2], offset[i]])
+    std::array::from_fn(|i| {
+        [
+            r[i][0] * scale[0],
+            r[i][1] * scale[1],
+            r[i][2] * scale[2],
+            offset[i],
+        ]
+    })
 }
 
-fn spacing(h: &NiftiHeader, affine: Option<&Affine>, to_mm: f64, notes: &mut Vec<String>) -> Option<[f64; 3]> {
+fn spacing(
+    h: &NiftiHeader,
+    affine: Option<&Affine>,
+    to_mm: f64,
+    notes: &mut Vec<String>,
+) -> Option<[f64; 3]> {
     let pixdim: [f64; 3] = std::array::from_fn(|a| decimal(h.pixdim[a + 1].abs()) * to_mm);
     let usable = |s: &[f64; 3]| s.iter().all(|&v| v.is_finite() && v > 0.0);
     let found = match affine.map(column_norms).filter(usable) {
         Some(s) if !usable(&pixdim) || (0..3).any(|a| (s[a] / pixdim[a] - 1.0).abs() > 1e-3) => {
-            notes.push(format!("pixdim {pixdim:?} and the affine's spacing {s:?} differ: the affine is used"));
+            notes.push(format!(
+                "pixdim {pixdim:?} and the affine's spacing {s:?} differ: the affine is used"
+            ));
             s
         }
         _ if usable(&pixdim) => pixdim,
@@ -212,7 +295,10 @@ where
     if n.iter().any(|&n| n > 32_767) {
         return Err(Error::file(
             path,
-            format!("{} × {} × {} voxels exceed NIfTI-1's 32767 a side", n[0], n[1], n[2]),
+            format!(
+                "{} × {} × {} voxels exceed NIfTI-1's 32767 a side",
+                n[0], n[1], n[2]
+            ),
             "crop the scan first",
         ));
     }
@@ -223,7 +309,10 @@ where
             "check that the folder exists, is writable and has space left",
         )
     };
-    let dir = path.parent().filter(|d| !d.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let dir = path
+        .parent()
+        .filter(|d| !d.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     crate::io::atomic::create_dir(dir)?;
     let gz = path.extension().is_some_and(|e| e == "gz");
     // The crate writes by name and eats dots in stems: a plain temporary name, then rename.
@@ -236,7 +325,9 @@ where
         .reference_header(&header_of(volume))
         .write_nifti(&volume.values.t())
         .map_err(|e| failed(&e))?;
-    let written = std::fs::metadata(file.path()).map_err(|e| failed(&e))?.len();
+    let written = std::fs::metadata(file.path())
+        .map_err(|e| failed(&e))?
+        .len();
     let whole = 352 + (volume.grid.len() * std::mem::size_of::<T>()) as u64;
     if !gz && written != whole {
         // The crate drops the error of its last flush: a full disk shows only in the size.
@@ -252,10 +343,20 @@ fn header_of<T>(volume: &Volume<T>) -> NiftiHeader {
         [0.0, s[1], 0.0, 0.0],
         [0.0, 0.0, s[2], 0.0],
     ]);
-    let straight = (0..3).all(|r| (0..3).all(|c| r == c || affine[r][c] == 0.0)) && (0..3).all(|r| affine[r][r] > 0.0);
+    let straight = (0..3).all(|r| (0..3).all(|c| r == c || affine[r][c] == 0.0))
+        && (0..3).all(|r| affine[r][r] > 0.0);
     let [srow_x, srow_y, srow_z] = affine.map(|row| row.map(|v| v as f32));
     NiftiHeader {
-        pixdim: [1.0, s[0] as f32, s[1] as f32, s[2] as f32, 0.0, 0.0, 0.0, 0.0],
+        pixdim: [
+            1.0,
+            s[0] as f32,
+            s[1] as f32,
+            s[2] as f32,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ],
         xyzt_units: 2,
         sform_code: 1,
         qform_code: i16::from(straight),

@@ -22,7 +22,11 @@ impl Turn {
         let closeness = |p: &[usize; 3]| (0..3).map(|r| cos[r][p[r]].abs()).sum::<f64>();
         // On ties (45°) the earlier permutation stays: stored order is kept.
         let best = PERMUTATIONS.into_iter().fold([0, 1, 2], |best, p| {
-            if closeness(&p) > closeness(&best) + 1e-9 { p } else { best }
+            if closeness(&p) > closeness(&best) + 1e-9 {
+                p
+            } else {
+                best
+            }
         });
         Some(Turn {
             from: best,
@@ -191,11 +195,7 @@ mod tests {
     #[test]
     fn oblique_scans_are_said() {
         let (s, c) = 10f64.to_radians().sin_cos();
-        let affine = [
-            [c, -s, 0.0, 0.0],
-            [s, c, 0.0, 0.0],
-            [0.0, 0.0, 1.0, 0.0],
-        ];
+        let affine = [[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
         let mut notes = Vec::new();
         canonical(Grid::new([1; 3], [1.0; 3]), vec![0.0], affine, &mut notes);
         assert!(notes[0].contains("10.0°"), "{notes:?}");

@@ -177,7 +177,14 @@ mod tests {
         let mut l = layout(Scalar::I16, true, [2, 1, 1]);
         l.slope = 0.5;
         l.intercept = 10.0;
-        let v = read(&mut &[0xFF, 0xFE, 0x01, 0x00][..], &l, Path::new("x"), 4, false).unwrap();
+        let v = read(
+            &mut &[0xFF, 0xFE, 0x01, 0x00][..],
+            &l,
+            Path::new("x"),
+            4,
+            false,
+        )
+        .unwrap();
         assert_eq!(v, [9.0, 138.0]);
     }
 

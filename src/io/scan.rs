@@ -45,11 +45,16 @@ pub struct Scan {
 pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
     let stored = stored(path)?;
     let mut notes = stored.notes;
-    let found = stored.spacing_mm.filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));
+    let found = stored
+        .spacing_mm
+        .filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));
     let Some(spacing) = found.or(spacing_mm) else {
         return Err(Error::file(
             path,
-            format!("{} without a voxel size: the file does not carry one", stored.format),
+            format!(
+                "{} without a voxel size: the file does not carry one",
+                stored.format
+            ),
             "give it with --spacing MM (for example --spacing 0.0195)",
         ));
     };
@@ -59,7 +64,12 @@ pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
         None => Volume::from_vec(grid, stored.values),
     };
     if let Some(wanted) = spacing_mm {
-        respace(&mut volume, checked_spacing(wanted)?, found.is_some(), &mut notes);
+        respace(
+            &mut volume,
+            checked_spacing(wanted)?,
+            found.is_some(),
+            &mut notes,
+        );
     }
     Ok(Scan {
         name: name(path),
@@ -74,7 +84,11 @@ pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
 
 fn stored(path: &Path) -> Result<Stored> {
     let meta = std::fs::metadata(path).map_err(|e| {
-        Error::file(path, format!("cannot be read: {e}"), "check the path and its permissions")
+        Error::file(
+            path,
+            format!("cannot be read: {e}"),
+            "check the path and its permissions",
+        )
     })?;
     if meta.is_dir() {
         return slices::read(path);
@@ -128,7 +142,9 @@ fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {
 fn respace(volume: &mut Volume<f32>, wanted: [f64; 3], known: bool, notes: &mut Vec<String>) {
     let old = volume.grid.spacing_mm;
     if known && (0..3).any(|a| (old[a] / wanted[a] - 1.0).abs() > 1e-3) {
-        notes.push(format!("voxel size {old:?} mm of the file replaced by {wanted:?} mm as asked"));
+        notes.push(format!(
+            "voxel size {old:?} mm of the file replaced by {wanted:?} mm as asked"
+        ));
     }
     if let Some(affine) = &mut volume.affine {
         for row in affine {
@@ -161,7 +177,11 @@ pub fn hash(path: &Path) -> Result<String> {
     let mut hasher = blake3::Hasher::new();
     if path.is_dir() {
         for file in slices::files(path)? {
-            let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let name = file
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
             hasher.update(name.as_bytes());
             hasher.update(hash_file(&file)?.as_bytes());
         }
@@ -175,7 +195,13 @@ fn hash_file(path: &Path) -> Result<blake3::Hash> {
     let mut hasher = blake3::Hasher::new();
     std::fs::File::open(path)
         .and_then(|file| hasher.update_reader(file).map(|h| h.finalize()))
-        .map_err(|e| Error::file(path, format!("cannot be read: {e}"), "check the path and its permissions"))
+        .map_err(|e| {
+            Error::file(
+                path,
+                format!("cannot be read: {e}"),
+                "check the path and its permissions",
+            )
+        })
 }
 
 #[cfg(test)]

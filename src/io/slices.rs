@@ -22,7 +22,11 @@ pub struct Slice {
 /// Files of a folder that are slices of one scan, in natural order (`s2` before `s10`).
 pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let unreadable = |e: std::io::Error| {
-        Error::file(folder, format!("cannot be listed: {e}"), "check the folder and its permissions")
+        Error::file(
+            folder,
+            format!("cannot be listed: {e}"),
+            "check the folder and its permissions",
+        )
     };
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
@@ -36,7 +40,10 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     if kinds.len() > 1 {
         return Err(Error::file(
             folder,
-            format!("holds slices of several kinds ({})", kinds.into_iter().collect::<Vec<_>>().join(", ")),
+            format!(
+                "holds slices of several kinds ({})",
+                kinds.into_iter().collect::<Vec<_>>().join(", ")
+            ),
             "keep one scan of one kind in a folder",
         ));
     }
@@ -51,7 +58,10 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
 }
 
 /// The kind of slice a file is, by its name; hidden files are none.
@@ -98,13 +108,15 @@ pub fn read(folder: &Path) -> Result<Stored> {
     let (nx, ny, nz) = (first.width, first.height, files.len());
     let plane = nx * ny;
     let mut values = Vec::new();
-    values.try_reserve_exact(plane.saturating_mul(nz)).map_err(|_| {
-        Error::file(
-            folder,
-            format!("{nx} × {ny} × {nz} voxels do not fit in this machine's memory"),
-            "use a machine with more memory, or fewer slices",
-        )
-    })?;
+    values
+        .try_reserve_exact(plane.saturating_mul(nz))
+        .map_err(|_| {
+            Error::file(
+                folder,
+                format!("{nx} × {ny} × {nz} voxels do not fit in this machine's memory"),
+                "use a machine with more memory, or fewer slices",
+            )
+        })?;
     values.resize(plane * nz, 0.0f32);
     values.par_chunks_mut(plane).zip(&files).enumerate().try_for_each(|(k, (out, file))| {
         let slice = if k == 0 { first.clone() } else { decode(file)? };
@@ -126,7 +138,11 @@ pub fn read(folder: &Path) -> Result<Stored> {
     let mut notes = Vec::new();
     let spacing_mm = spacing(&first, &mut notes);
     Ok(Stored {
-        format: format!("{nz} slices ({}), {}", extension(&files[0]).unwrap_or("?"), first.stored_as),
+        format: format!(
+            "{nz} slices ({}), {}",
+            extension(&files[0]).unwrap_or("?"),
+            first.stored_as
+        ),
         n: [nx, ny, nz],
         values,
         spacing_mm,
@@ -143,7 +159,9 @@ fn decode(file: &Path) -> Result<Slice> {
 pub fn spacing(slice: &Slice, notes: &mut Vec<String>) -> Option<[f64; 3]> {
     let [x, y] = slice.pixel_mm?;
     if slice.slice_mm.is_none() {
-        notes.push("the distance between slices is not in the file: taken as the pixel's height".into());
+        notes.push(
+            "the distance between slices is not in the file: taken as the pixel's height".into(),
+        );
     }
     Some([x, y, slice.slice_mm.unwrap_or(y)])
 }
@@ -154,15 +172,27 @@ mod tests {
 
     #[test]
     fn digits_compare_as_numbers() {
-        let mut names = ["s10.tif", "s9.tif", "s010.tif", "s1.tif", "t1", "s2b3", "s2b20"];
+        let mut names = [
+            "s10.tif", "s9.tif", "s010.tif", "s1.tif", "t1", "s2b3", "s2b20",
+        ];
         names.sort_by(|a, b| natural(a, b));
-        assert_eq!(names, ["s1.tif", "s2b3", "s2b20", "s9.tif", "s10.tif", "s010.tif", "t1"]);
+        assert_eq!(
+            names,
+            [
+                "s1.tif", "s2b3", "s2b20", "s9.tif", "s10.tif", "s010.tif", "t1"
+            ]
+        );
     }
 
     #[test]
     fn a_folder_without_slices_says_so() {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("notes.txt"), "x").unwrap();
-        assert!(files(dir.path()).unwrap_err().to_string().contains("no slices"));
+        assert!(
+            files(dir.path())
+                .unwrap_err()
+                .to_string()
+                .contains("no slices")
+        );
     }
 }

@@ -11,7 +11,8 @@ use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-const DAMAGED: &str = "the file is truncated, damaged or of a rare kind: export it again as plain grey-value TIFF";
+const DAMAGED: &str =
+    "the file is truncated, damaged or of a rare kind: export it again as plain grey-value TIFF";
 /// Larger pages than this are refused (an 8-bit page of 46 000 × 46 000 pixels).
 const PAGE_BYTES: u64 = 2 << 30;
 
@@ -21,8 +22,13 @@ struct Pages {
 }
 
 fn open(path: &Path) -> Result<Pages> {
-    let unreadable =
-        |e: std::io::Error| Error::file(path, format!("cannot be read: {e}"), "check the path and its permissions");
+    let unreadable = |e: std::io::Error| {
+        Error::file(
+            path,
+            format!("cannot be read: {e}"),
+            "check the path and its permissions",
+        )
+    };
     let file = File::open(path).map_err(unreadable)?;
     let file_bytes = file.metadata().map_err(unreadable)?.len();
     let mut limits = Limits::default();
@@ -31,7 +37,10 @@ fn open(path: &Path) -> Result<Pages> {
     let decoder = Decoder::new(BufReader::new(file))
         .map_err(|e| damaged(path, &e))?
         .with_limits(limits);
-    Ok(Pages { decoder, file_bytes })
+    Ok(Pages {
+        decoder,
+        file_bytes,
+    })
 }
 
 fn damaged(path: &Path, e: &tiff::TiffError) -> Error {
@@ -74,7 +83,10 @@ pub fn read(path: &Path) -> Result<Stored> {
         if (next.width, next.height) != (nx, ny) {
             return Err(Error::file(
                 path,
-                format!("page {nz} has {} × {} pixels, the first has {nx} × {ny}", next.width, next.height),
+                format!(
+                    "page {nz} has {} × {} pixels, the first has {nx} × {ny}",
+                    next.width, next.height
+                ),
                 "one scan has pages of one size: export the stack again without thumbnails or other resolutions",
             ));
         }
@@ -83,7 +95,10 @@ pub fn read(path: &Path) -> Result<Stored> {
     if facts.channels > 1 || facts.frames > 1 {
         return Err(Error::file(
             path,
-            format!("is an ImageJ hyperstack of {} channels and {} frames", facts.channels, facts.frames),
+            format!(
+                "is an ImageJ hyperstack of {} channels and {} frames",
+                facts.channels, facts.frames
+            ),
             "save the one channel and frame that holds the scan",
         ));
     }
@@ -117,7 +132,10 @@ fn page(pages: &mut Pages, path: &Path) -> Result<Slice> {
     if pixels == 0 || bytes > pages.file_bytes.saturating_mul(2000) + 4096 || bytes > PAGE_BYTES {
         return Err(Error::file(
             path,
-            format!("the header promises {width} × {height} pixels, the file holds {} bytes", pages.file_bytes),
+            format!(
+                "the header promises {width} × {height} pixels, the file holds {} bytes",
+                pages.file_bytes
+            ),
             DAMAGED,
         ));
     }
@@ -128,14 +146,29 @@ fn page(pages: &mut Pages, path: &Path) -> Result<Slice> {
     if values.len() != width * height {
         return Err(Error::file(
             path,
-            format!("{} pixels decoded where {width} × {height} were expected", values.len()),
+            format!(
+                "{} pixels decoded where {width} × {height} were expected",
+                values.len()
+            ),
             DAMAGED,
         ));
     }
-    Ok(Slice { width, height, values, stored_as, pixel_mm, slice_mm })
+    Ok(Slice {
+        width,
+        height,
+        values,
+        stored_as,
+        pixel_mm,
+        slice_mm,
+    })
 }
 
-fn grey(decoded: DecodingResult, bits: u8, width: usize, height: usize) -> (Vec<f32>, &'static str) {
+fn grey(
+    decoded: DecodingResult,
+    bits: u8,
+    width: usize,
+    height: usize,
+) -> (Vec<f32>, &'static str) {
     fn cast<T: Copy>(v: &[T], f: impl Fn(T) -> f32) -> Vec<f32> {
         v.iter().map(|&x| f(x)).collect()
     }
@@ -174,7 +207,9 @@ fn unpacked(bytes: &[u8], bits: u8, width: usize, height: usize) -> Vec<f32> {
 /// ImageJ writes stacks over 4 GiB (and, on request, any) as one page followed by the planes of all the others.
 fn contiguous(pages: &mut Pages, path: &Path, n: [usize; 3]) -> Result<Vec<f32>> {
     let d = &mut pages.decoder;
-    let tag = |d: &mut Decoder<BufReader<File>>, t: Tag| d.get_tag_u64_vec(t).map_err(|e| damaged(path, &e));
+    let tag = |d: &mut Decoder<BufReader<File>>, t: Tag| {
+        d.get_tag_u64_vec(t).map_err(|e| damaged(path, &e))
+    };
     let plain = d.get_tag_u32(Tag::Compression).unwrap_or(1) == 1;
     let offset = tag(d, Tag::StripOffsets)?.first().copied().unwrap_or(0);
     let bits = tag(d, Tag::BitsPerSample)?.first().copied().unwrap_or(0);
@@ -191,7 +226,13 @@ fn contiguous(pages: &mut Pages, path: &Path, n: [usize; 3]) -> Result<Vec<f32>>
         return Err(rare_stack(path, n[2]));
     }
     let big_endian = d.byte_order() == tiff::tags::ByteOrder::BigEndian;
-    let layout = Layout { scalar, big_endian, n, slope: 1.0, intercept: 0.0 };
+    let layout = Layout {
+        scalar,
+        big_endian,
+        n,
+        slope: 1.0,
+        intercept: 0.0,
+    };
     let left = pages.file_bytes.saturating_sub(offset);
     let source = d.inner();
     source
@@ -203,7 +244,9 @@ fn contiguous(pages: &mut Pages, path: &Path, n: [usize; 3]) -> Result<Vec<f32>>
 fn rare_stack(path: &Path, images: usize) -> Error {
     Error::file(
         path,
-        format!("says it is an ImageJ stack of {images} slices, but holds one page and no plain planes after it"),
+        format!(
+            "says it is an ImageJ stack of {images} slices, but holds one page and no plain planes after it"
+        ),
         "export it again as an uncompressed TIFF stack",
     )
 }
@@ -231,7 +274,12 @@ fn imagej(description: &str) -> ImageJ {
             "channels" => found.channels = value.parse().unwrap_or(0),
             "frames" => found.frames = value.parse().unwrap_or(0),
             "unit" => found.unit_mm = unit_mm(value),
-            "spacing" => found.spacing = value.parse().ok().filter(|s: &f64| s.is_finite() && *s > 0.0),
+            "spacing" => {
+                found.spacing = value
+                    .parse()
+                    .ok()
+                    .filter(|s: &f64| s.is_finite() && *s > 0.0)
+            }
             _ => {}
         }
     }
@@ -242,7 +290,9 @@ fn imagej(description: &str) -> ImageJ {
 pub fn unit_mm(unit: &str) -> Option<f64> {
     Some(match unit.trim().to_lowercase().as_str() {
         "mm" | "millimeter" | "millimeters" | "millimetre" => 1.0,
-        "um" | "µm" | "μm" | "\\u00b5m" | "micron" | "microns" | "micrometer" | "micrometre" => 1e-3,
+        "um" | "µm" | "μm" | "\\u00b5m" | "micron" | "microns" | "micrometer" | "micrometre" => {
+            1e-3
+        }
         "nm" | "nanometer" | "nanometre" => 1e-6,
         "cm" | "centimeter" | "centimetre" => 10.0,
         "m" | "meter" | "metre" => 1e3,
@@ -256,7 +306,10 @@ fn description(d: &mut Decoder<BufReader<File>>) -> String {
     match d.find_tag(Tag::ImageDescription) {
         Ok(Some(value)) => match value {
             tiff::decoder::ifd::Value::Ascii(text) => text,
-            other => other.into_u8_vec().map(|b| b.iter().map(|&c| char::from(c)).collect()).unwrap_or_default(),
+            other => other
+                .into_u8_vec()
+                .map(|b| b.iter().map(|&c| char::from(c)).collect())
+                .unwrap_or_default(),
         },
         _ => String::new(),
     }
@@ -274,7 +327,10 @@ fn resolution(d: &mut Decoder<BufReader<File>>) -> (Option<[f64; 2]>, Option<f64
     if text.starts_with("ImageJ=") {
         let facts = imagej(&text);
         let unit = facts.unit_mm;
-        return (unit.map(|u| [u / x, u / y]), unit.zip(facts.spacing).map(|(u, s)| u * s));
+        return (
+            unit.map(|u| [u / x, u / y]),
+            unit.zip(facts.spacing).map(|(u, s)| u * s),
+        );
     }
     let unit = match d.get_tag_u32(Tag::ResolutionUnit).unwrap_or(2) {
         2 if !PRINTING_DPI.contains(&x) => 25.4,
@@ -330,13 +386,25 @@ mod tests {
         for k in 0..pages {
             let mut image = encoder.new_image::<colortype::Gray16>(3, 2).unwrap();
             if resolution > 0 {
-                let r = Rational { n: resolution, d: 1 };
-                image.encoder().write_tag(Tag::XResolution, r.clone()).unwrap();
+                let r = Rational {
+                    n: resolution,
+                    d: 1,
+                };
+                image
+                    .encoder()
+                    .write_tag(Tag::XResolution, r.clone())
+                    .unwrap();
                 image.encoder().write_tag(Tag::YResolution, r).unwrap();
-                image.encoder().write_tag(Tag::ResolutionUnit, 1u16).unwrap();
+                image
+                    .encoder()
+                    .write_tag(Tag::ResolutionUnit, 1u16)
+                    .unwrap();
             }
             if k == 0 && !text.is_empty() {
-                image.encoder().write_tag(Tag::ImageDescription, text).unwrap();
+                image
+                    .encoder()
+                    .write_tag(Tag::ImageDescription, text)
+                    .unwrap();
             }
             let values: Vec<u16> = (0..6).map(|v| (k * 1000 + v) as u16).collect();
             image.write_data(&values).unwrap();
@@ -347,11 +415,19 @@ mod tests {
     fn an_imagej_stack_brings_its_voxel_size() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("s.tif");
-        write_stack(&path, "ImageJ=1.54f\nimages=4\nslices=4\nunit=um\nspacing=30.0\nloop=false\n", 4, 50);
+        write_stack(
+            &path,
+            "ImageJ=1.54f\nimages=4\nslices=4\nunit=um\nspacing=30.0\nloop=false\n",
+            4,
+            50,
+        );
         let s = read(&path).unwrap();
         assert_eq!(s.n, [3, 2, 4]);
         let spacing = s.spacing_mm.unwrap();
-        assert!((spacing[0] - 2e-5).abs() < 1e-12 && (spacing[2] - 0.03).abs() < 1e-12, "{spacing:?}");
+        assert!(
+            (spacing[0] - 2e-5).abs() < 1e-12 && (spacing[2] - 0.03).abs() < 1e-12,
+            "{spacing:?}"
+        );
         assert_eq!(s.values[6 * 3 + 5], 3005.0);
     }
 
@@ -393,13 +469,18 @@ mod tests {
 
     #[test]
     fn packed_bits_are_unpacked_row_by_row() {
-        assert_eq!(unpacked(&[0b1010_0000, 0b0100_0000], 1, 3, 2), [1.0, 0.0, 1.0, 0.0, 1.0, 0.0]);
+        assert_eq!(
+            unpacked(&[0b1010_0000, 0b0100_0000], 1, 3, 2),
+            [1.0, 0.0, 1.0, 0.0, 1.0, 0.0]
+        );
         assert_eq!(unpacked(&[0x1F], 4, 2, 1), [1.0, 15.0]);
     }
 
     #[test]
     fn ome_sizes_are_read() {
-        let (xy, z) = ome(r#"<OME><Pixels PhysicalSizeX="19.5" PhysicalSizeY="19.5" PhysicalSizeZ="0.02" PhysicalSizeZUnit="mm"/>"#);
+        let (xy, z) = ome(
+            r#"<OME><Pixels PhysicalSizeX="19.5" PhysicalSizeY="19.5" PhysicalSizeZ="0.02" PhysicalSizeZUnit="mm"/>"#,
+        );
         let xy = xy.unwrap();
         assert!((xy[0] - 0.0195).abs() < 1e-12 && z == Some(0.02));
     }

@@ -37,23 +37,42 @@ impl Components {
             runs.extend(row);
         }
         rows.push(runs.len());
-        let mut parent: Vec<u32> = (0..u32::try_from(runs.len()).expect("fewer than 2³² runs")).collect();
+        let mut parent: Vec<u32> =
+            (0..u32::try_from(runs.len()).expect("fewer than 2³² runs")).collect();
         for row in 0..rows.len() - 1 {
             if row % ny > 0 {
-                join(&mut parent, &runs, rows[row - 1]..rows[row], rows[row]..rows[row + 1]);
+                join(
+                    &mut parent,
+                    &runs,
+                    rows[row - 1]..rows[row],
+                    rows[row]..rows[row + 1],
+                );
             }
             if row >= ny {
-                join(&mut parent, &runs, rows[row - ny]..rows[row - ny + 1], rows[row]..rows[row + 1]);
+                join(
+                    &mut parent,
+                    &runs,
+                    rows[row - ny]..rows[row - ny + 1],
+                    rows[row]..rows[row + 1],
+                );
             }
         }
         let (label, voxels) = number(parent, &runs);
-        Components { runs, rows, label, voxels }
+        Components {
+            runs,
+            rows,
+            label,
+            voxels,
+        }
     }
 
     /// The component with the most voxels; the first of equals. None without bone.
     pub fn largest(&self) -> Option<u32> {
         let most = self.voxels.iter().max()?;
-        self.voxels.iter().position(|v| v == most).map(|at| at as u32)
+        self.voxels
+            .iter()
+            .position(|v| v == most)
+            .map(|at| at as u32)
     }
 
     /// Sets all voxels of other components to 0.
@@ -77,7 +96,9 @@ impl Components {
     pub fn spanning_z(&self, mask: &Volume<u8>) -> Vec<u32> {
         let [_, ny, nz] = mask.grid.n;
         let of = |slice: usize| -> std::collections::BTreeSet<u32> {
-            (self.rows[slice * ny]..self.rows[(slice + 1) * ny]).map(|run| self.label[run]).collect()
+            (self.rows[slice * ny]..self.rows[(slice + 1) * ny])
+                .map(|run| self.label[run])
+                .collect()
         };
         of(0).intersection(&of(nz - 1)).copied().collect()
     }
@@ -88,8 +109,14 @@ fn runs_of(row: &[u8]) -> Vec<Run> {
     let mut at = 0;
     while let Some(skip) = row[at..].iter().position(|&v| v != 0) {
         let start = at + skip;
-        let end = row[start..].iter().position(|&v| v == 0).map_or(row.len(), |len| start + len);
-        runs.push(Run { start: start as u32, end: end as u32 });
+        let end = row[start..]
+            .iter()
+            .position(|&v| v == 0)
+            .map_or(row.len(), |len| start + len);
+        runs.push(Run {
+            start: start as u32,
+            end: end as u32,
+        });
         at = end;
     }
     runs

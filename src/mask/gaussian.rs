@@ -11,7 +11,9 @@ use std::ops::Range;
 /// Half of a normalised, symmetric kernel: `[w0, w1, …, wR]` with `R = ⌊4σ + ½⌋`, `σ` in voxels.
 pub fn kernel(sigma: f64) -> Vec<f64> {
     let radius = (4.0 * sigma + 0.5).floor() as usize;
-    let raw: Vec<f64> = (0..=radius).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp()).collect();
+    let raw: Vec<f64> = (0..=radius)
+        .map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp())
+        .collect();
     let sum = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
     raw.into_iter().map(|w| w / sum).collect()
 }
@@ -39,14 +41,21 @@ pub fn map_slabs<R: Send>(
     let [nx, ny, nz] = volume.grid.n;
     let plane = nx * ny;
     let values = volume.as_slice();
-    let kernel = if sigma > 0.0 { kernel(sigma) } else { vec![1.0] };
+    let kernel = if sigma > 0.0 {
+        kernel(sigma)
+    } else {
+        vec![1.0]
+    };
     let thickness = SLAB.max(4 * (kernel.len() - 1));
     (0..nz.div_ceil(thickness))
         .into_par_iter()
         .map(|s| {
             let slices = s * thickness..((s + 1) * thickness).min(nz);
             let slab = if kernel.len() == 1 {
-                values[slices.start * plane..slices.end * plane].iter().map(|&v| clean(v)).collect()
+                values[slices.start * plane..slices.end * plane]
+                    .iter()
+                    .map(|&v| clean(v))
+                    .collect()
             } else {
                 smooth_slab(values, [nx, ny, nz], &kernel, slices.clone(), &clean)
             };
@@ -127,7 +136,13 @@ impl Scratch {
         }
     }
 
-    fn smooth_slice(&mut self, from: &[f32], to: &mut [f32], kernel: &[f64], clean: &impl Fn(f32) -> f32) {
+    fn smooth_slice(
+        &mut self,
+        from: &[f32],
+        to: &mut [f32],
+        kernel: &[f64],
+        clean: &impl Fn(f32) -> f32,
+    ) {
         let (nx, ny, radius) = (self.nx, self.ny, kernel.len() - 1);
         for (row, out) in from.chunks_exact(nx).zip(self.along_x.chunks_exact_mut(nx)) {
             for (at, slot) in self.row.iter_mut().enumerate() {
@@ -136,7 +151,12 @@ impl Scratch {
             weigh(&mut self.sum, &self.row[radius..radius + nx], kernel[0]);
             for (r, &w) in kernel.iter().enumerate().skip(1) {
                 let (low, high) = (radius - r, radius + r);
-                add_pair(&mut self.sum, &self.row[low..low + nx], &self.row[high..high + nx], w);
+                add_pair(
+                    &mut self.sum,
+                    &self.row[low..low + nx],
+                    &self.row[high..high + nx],
+                    w,
+                );
             }
             store(out, &self.sum);
         }
@@ -175,7 +195,8 @@ mod tests {
                 for di in -r..=r {
                     let [i, j, k] = [[di, 0], [dj, 1], [dk, 2]]
                         .map(|[d, a]| mirrored(at[a as usize] as isize + d, n[a as usize]));
-                    let w = half[di.unsigned_abs()] * half[dj.unsigned_abs()] * half[dk.unsigned_abs()];
+                    let w =
+                        half[di.unsigned_abs()] * half[dj.unsigned_abs()] * half[dk.unsigned_abs()];
                     sum += w * f64::from(values[(k * n[1] + j) * n[0] + i]);
                 }
             }
@@ -186,7 +207,9 @@ mod tests {
     #[test]
     fn slabs_agree_with_the_definition_also_across_their_borders_and_in_thin_volumes() {
         for n in [[5, 4, 60], [3, 2, 1], [1, 7, 3]] {
-            let values: Vec<f32> = (0..n.iter().product()).map(|v| ((v * 7919) % 251) as f32).collect();
+            let values: Vec<f32> = (0..n.iter().product())
+                .map(|v| ((v * 7919) % 251) as f32)
+                .collect();
             let got = smoothed(n, values.clone(), 1.3);
             for k in 0..n[2] {
                 for j in 0..n[1] {

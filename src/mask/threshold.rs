@@ -20,7 +20,11 @@ pub fn otsu(counts: &[u64], min: f64, max: f64) -> Option<f64> {
     let width = (max - min) / counts.len() as f64;
     let center = |b: usize| min + (b as f64 + 0.5) * width;
     let total: f64 = counts.iter().map(|&c| c as f64).sum();
-    let moment: f64 = counts.iter().enumerate().map(|(b, &c)| c as f64 * center(b)).sum();
+    let moment: f64 = counts
+        .iter()
+        .enumerate()
+        .map(|(b, &c)| c as f64 * center(b))
+        .sum();
     let (mut below, mut moment_below) = (0.0, 0.0);
     // A run of equal maxima lies between two peaks: its middle is taken.
     let (mut best, mut first, mut last) = (0.0, None, 0);
@@ -46,7 +50,9 @@ mod tests {
 
     #[test]
     fn two_peaks_are_split_in_the_middle_of_the_gap() {
-        let values: Vec<f32> = (0..1000).map(|i| if i % 4 == 0 { 90.0 } else { 10.0 }).collect();
+        let values: Vec<f32> = (0..1000)
+            .map(|i| if i % 4 == 0 { 90.0 } else { 10.0 })
+            .collect();
         let t = otsu(&histogram(&values, 10.0, 90.0), 10.0, 90.0).unwrap();
         assert!((t - 50.0).abs() < 0.1, "{t}");
     }
@@ -68,7 +74,10 @@ mod tests {
         };
         let best = (2..13).map(between).fold(0.0, f64::max);
         let t = otsu(&counts, 0.0, 16.0).unwrap();
-        assert!((between(t.floor() as usize) - best).abs() < 1e-9 * best, "{t}");
+        assert!(
+            (between(t.floor() as usize) - best).abs() < 1e-9 * best,
+            "{t}"
+        );
     }
 
     #[test]

@@ -53,7 +53,10 @@ impl Inside<'_> {
             .enumerate();
         match self {
             Inside::Box => 0,
-            Inside::Cylinder { center_mm, diameter_mm } => rows
+            Inside::Cylinder {
+                center_mm,
+                diameter_mm,
+            } => rows
                 .map(|(r, voxels)| {
                     let y = ((r % grid.n[1]) as f64 + 0.5) * grid.spacing_mm[1] - center_mm[1];
                     let reach = diameter_mm * diameter_mm / 4.0 - y * y;

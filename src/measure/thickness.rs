@@ -8,14 +8,27 @@ pub fn voxel_face_area_mm2(bone: &Volume<u8>) -> f64 {
     let [nx, ny, nz] = bone.grid.n;
     let [sx, sy, sz] = bone.grid.spacing_mm;
     let voxels = bone.as_slice();
-    let differing = |a: &[u8], b: &[u8]| a.iter().zip(b).filter(|(a, b)| (**a != 0) != (**b != 0)).count() as u64;
+    let differing = |a: &[u8], b: &[u8]| {
+        a.iter()
+            .zip(b)
+            .filter(|(a, b)| (**a != 0) != (**b != 0))
+            .count() as u64
+    };
     let row = |r: usize| &voxels[r * nx..(r + 1) * nx];
     let [x, y, z] = (0..ny * nz)
         .into_par_iter()
         .map(|r| {
             let along_x = differing(&row(r)[1..], &row(r)[..nx - 1]);
-            let along_y = if r % ny + 1 < ny { differing(row(r), row(r + 1)) } else { 0 };
-            let along_z = if r + ny < ny * nz { differing(row(r), row(r + ny)) } else { 0 };
+            let along_y = if r % ny + 1 < ny {
+                differing(row(r), row(r + 1))
+            } else {
+                0
+            };
+            let along_z = if r + ny < ny * nz {
+                differing(row(r), row(r + ny))
+            } else {
+                0
+            };
             [along_x, along_y, along_z]
         })
         .reduce(|| [0; 3], |a, b| std::array::from_fn(|i| a[i] + b[i]));
@@ -58,6 +71,9 @@ mod tests {
     #[test]
     fn a_solid_block_has_no_thickness() {
         let grid = Grid::new([3, 4, 5], [1.0; 3]);
-        assert_eq!(plate_thickness_mm(&Volume::from_vec(grid, vec![1; 60])), None);
+        assert_eq!(
+            plate_thickness_mm(&Volume::from_vec(grid, vec![1; 60])),
+            None
+        );
     }
 }

@@ -1,28 +1,133 @@
 //! Owns `segment` on disk: a scan in, `mask.nii.gz`, `segment.json` and `segment.png` out, and reading them back.
 
 use crate::error::Result;
-use crate::run::not_available;
+use crate::io::specimen::{self, Input, SegmentRecord};
+use crate::io::{atomic, picture, scan};
 use crate::run::session::Session;
-use crate::stage::segment::SegmentParams;
-use crate::volume::Specimen;
-use serde::Serialize;
+use crate::stage::segment::{self as stage, SegmentParams, Voi};
+use crate::volume::{Specimen, Volume};
 use std::path::Path;
 
-/// What `--json` prints and `segment.json` holds.
-#[derive(Debug, Clone, Serialize)]
-pub struct SegmentSummary {}
-
-/// Segments `input` (a file, or a folder of slices) into `dir`.
+/// Segments `input` (a file, or a folder of slices) into `dir`. What is up to date (same input, settings and version)
+/// is kept unless the session forces.
 pub fn segment(
-    _input: &Path,
-    _dir: &Path,
-    _params: &SegmentParams,
-    _session: &Session,
-) -> Result<SegmentSummary> {
-    Err(not_available("segment"))
+    input: &Path,
+    dir: &Path,
+    params: &SegmentParams,
+    session: &Session,
+) -> Result<SegmentRecord> {
+    let blake3 = scan::hash(input)?;
+    let voi_blake3 = match &params.voi {
+        Voi::Mask(path) => Some(scan::hash(path)?),
+        _ => None,
+    };
+    if let Some(kept) = specimen::record(dir)
+        && !session.force
+        && up_to_date(&kept, dir, params, (&blake3, &voi_blake3))
+    {
+        session.say(format!("{}: up to date", dir.display()));
+        return Ok(kept);
+    }
+    let scan = scan::read(input, params.spacing_mm)?;
+    scan.notes
+        .iter()
+        .for_each(|note| session.say(format!("{}: {note}", scan.name)));
+    let voi_mask = match &params.voi {
+        Voi::Mask(path) => Some(specimen::read_mask(
+            path,
+            Some(scan.volume.grid.spacing_mm),
+        )?),
+        _ => None,
+    };
+    let segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
+    let record = SegmentRecord {
+        program: env!("CARGO_PKG_NAME").into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        scan: scan.name,
+        input: Input {
+            path: input.to_path_buf(),
+            blake3,
+            voi_blake3,
+            format: scan.format,
+            unit: scan.unit,
+            notes: scan.notes,
+        },
+        settings: params.clone(),
+        results: segmented.summary,
+    };
+    say(&record, session);
+    if !session.dry_run {
+        write(dir, &record, &scan.volume, &segmented.specimen)?;
+    }
+    Ok(record)
 }
 
 /// The specimen that `segment` left in `dir`.
-pub fn load(_dir: &Path) -> Result<Specimen> {
-    Err(not_available("reading a segmented scan"))
+pub fn load(dir: &Path) -> Result<Specimen> {
+    specimen::load(dir)
+}
+
+fn up_to_date(
+    kept: &SegmentRecord,
+    dir: &Path,
+    params: &SegmentParams,
+    (blake3, voi_blake3): (&String, &Option<String>),
+) -> bool {
+    kept.version == env!("CARGO_PKG_VERSION")
+        && kept.settings == *params
+        && kept.input.blake3 == *blake3
+        && kept.input.voi_blake3 == *voi_blake3
+        && dir.join(specimen::MASK).is_file()
+        && dir.join(specimen::PICTURE).is_file()
+}
+
+fn write(
+    dir: &Path,
+    record: &SegmentRecord,
+    scan: &Volume<f32>,
+    specimen: &Specimen,
+) -> Result<()> {
+    atomic::create_dir(dir)?;
+    let picture_path = dir.join(specimen::PICTURE);
+    match &record.settings.crop {
+        Some(crop) => picture::write(&picture_path, &scan.cropped(crop), &specimen.bone)?,
+        None => picture::write(&picture_path, scan, &specimen.bone)?,
+    }
+    specimen::write(dir, &specimen.bone, record)
+}
+
+fn say(record: &SegmentRecord, session: &Session) {
+    let r = &record.results;
+    let [nx, ny, nz] = r.voxels;
+    session.say(format!(
+        "{}: {nx} × {ny} × {nz} voxels, {}",
+        record.scan, record.input.format
+    ));
+    if r.threshold == "otsu" {
+        session.say(format!(
+            "{}: Otsu's threshold {}",
+            record.scan,
+            r.lower.unwrap_or(f64::NAN)
+        ));
+    }
+    session.say(format!(
+        "{}: {} bone voxels, BV {:.4} mm³, TV {:.4} mm³ ({}), BV/TV {:.4}; {} voxels in {} smaller pieces removed",
+        record.scan,
+        r.bone_voxels,
+        r.bv_mm3,
+        r.tv_mm3,
+        r.tv_definition,
+        r.bv_tv,
+        r.removed_voxels,
+        if r.removed_voxels > 0 { r.components - 1 } else { 0 },
+    ));
+    if let Some(t) = r.mean_thickness_mm {
+        session.say(format!(
+            "{}: mean strut thickness about {t:.3} mm (2 BV/BS)",
+            record.scan
+        ));
+    }
+    r.warnings
+        .iter()
+        .for_each(|w| session.warn(format!("{}: {w}", record.scan)));
 }

@@ -62,7 +62,11 @@ pub fn segment(
 ) -> Result<Segmented> {
     params.check()?;
     if !params.otsu && params.lower.is_none() && params.upper.is_none() {
-        return Err(Error::setting("lower", "no threshold given", "give --lower (and --upper), or --otsu"));
+        return Err(Error::setting(
+            "lower",
+            "no threshold given",
+            "give --lower (and --upper), or --otsu",
+        ));
     }
     let cropped;
     let (scan, voi_mask, corner_mm) = match params.crop {
@@ -87,7 +91,9 @@ pub fn segment(
     let components = Components::of(&bone);
     let Some(largest) = components.largest() else {
         return Err(Error::specimen(
-            format!("all {selected} voxels in the window lie outside the volume of interest ({tv_definition})"),
+            format!(
+                "all {selected} voxels in the window lie outside the volume of interest ({tv_definition})"
+            ),
             "check the volume of interest against the picture of the scan",
         ));
     };
@@ -98,7 +104,12 @@ pub fn segment(
         selected - outside - components.voxels[largest as usize]
     };
     let tv_mm3 = inside.tv_mm3(&scan.grid);
-    let specimen = Specimen { name: name.into(), bone, tv_mm3, tv_definition };
+    let specimen = Specimen {
+        name: name.into(),
+        bone,
+        tv_mm3,
+        tv_definition,
+    };
     let mut summary = SegmentSummary {
         voxels: scan.grid.n,
         spacing_mm: scan.grid.spacing_mm,
@@ -127,7 +138,10 @@ pub fn segment(
 fn warnings(s: &SegmentSummary) -> Vec<String> {
     let mut found = Vec::new();
     if s.non_finite_voxels > 0 {
-        found.push(format!("{} voxels are NaN or infinite: taken as pore", s.non_finite_voxels));
+        found.push(format!(
+            "{} voxels are NaN or infinite: taken as pore",
+            s.non_finite_voxels
+        ));
     }
     if let Some(t) = s.mean_thickness_mm {
         let voxels = t / s.spacing_mm.iter().copied().fold(0.0, f64::max);
@@ -146,7 +160,10 @@ fn warnings(s: &SegmentSummary) -> Vec<String> {
         ));
     }
     if s.bv_tv > 0.95 {
-        found.push(format!("BV/TV is {:.3}: nearly everything was selected", s.bv_tv));
+        found.push(format!(
+            "BV/TV is {:.3}: nearly everything was selected",
+            s.bv_tv
+        ));
     }
     found
 }
@@ -167,16 +184,36 @@ mod tests {
     }
 
     fn params() -> SegmentParams {
-        SegmentParams { lower: Some(200.0), ..Default::default() }
+        SegmentParams {
+            lower: Some(200.0),
+            ..Default::default()
+        }
     }
 
     #[test]
     fn the_largest_component_stays_and_the_rest_is_counted() {
         let s = segment("bar", &scan(), &params(), None).unwrap().summary;
-        assert_eq!((s.selected_voxels, s.components, s.removed_voxels, s.bone_voxels), (73, 2, 1, 72));
+        assert_eq!(
+            (
+                s.selected_voxels,
+                s.components,
+                s.removed_voxels,
+                s.bone_voxels
+            ),
+            (73, 2, 1, 72)
+        );
         assert!((s.bv_tv - 72.0 / 800.0).abs() < 1e-15);
-        let all = SegmentParams { keep_all: true, ..params() };
-        assert_eq!(segment("bar", &scan(), &all, None).unwrap().summary.bone_voxels, 73);
+        let all = SegmentParams {
+            keep_all: true,
+            ..params()
+        };
+        assert_eq!(
+            segment("bar", &scan(), &all, None)
+                .unwrap()
+                .summary
+                .bone_voxels,
+            73
+        );
     }
 
     #[test]
@@ -184,9 +221,15 @@ mod tests {
         let mut scan = scan();
         scan.values[[0, 5, 4]] = f32::INFINITY;
         scan.values[[7, 0, 0]] = f32::NAN;
-        let open = SegmentParams { upper: Some(600.0), ..Default::default() };
+        let open = SegmentParams {
+            upper: Some(600.0),
+            ..Default::default()
+        };
         let s = segment("bar", &scan, &open, None).unwrap();
-        assert_eq!((s.summary.non_finite_voxels, s.summary.bone_voxels), (2, 798));
+        assert_eq!(
+            (s.summary.non_finite_voxels, s.summary.bone_voxels),
+            (2, 798)
+        );
         assert!(s.summary.warnings[0].contains("NaN"));
         assert_eq!(s.specimen.bone.values[[0, 5, 4]], 0);
     }
@@ -195,7 +238,10 @@ mod tests {
     fn crop_comes_first_and_a_given_cylinder_stays_in_scan_coordinates() {
         let p = SegmentParams {
             crop: Some([[2, 8], [2, 8], [1, 5]]),
-            voi: Voi::Cylinder { diameter_mm: Some(0.2), center_mm: Some([0.45, 0.55]) },
+            voi: Voi::Cylinder {
+                diameter_mm: Some(0.2),
+                center_mm: Some([0.45, 0.55]),
+            },
             ..params()
         };
         let s = segment("bar", &scan(), &p, None).unwrap();
@@ -209,9 +255,14 @@ mod tests {
     #[test]
     fn a_mask_voi_is_counted_and_must_fit() {
         let grid = scan().grid;
-        let p = SegmentParams { voi: Voi::Mask("v.nii.gz".into()), ..params() };
+        let p = SegmentParams {
+            voi: Voi::Mask("v.nii.gz".into()),
+            ..params()
+        };
         let half: Vec<u8> = (0..grid.len()).map(|at| u8::from(at / 100 < 4)).collect();
-        let s = segment("bar", &scan(), &p, Some(&Volume::from_vec(grid, half))).unwrap().summary;
+        let s = segment("bar", &scan(), &p, Some(&Volume::from_vec(grid, half)))
+            .unwrap()
+            .summary;
         assert_eq!((s.bone_voxels, s.outside_voi_voxels), (36, 37));
         assert!((s.tv_mm3 - 0.4).abs() < 1e-12);
         let other = Volume::from_vec(Grid::new([1, 1, 1], [0.1; 3]), vec![1]);
@@ -222,25 +273,69 @@ mod tests {
     fn unusable_settings_say_what_to_do() {
         let cases = [
             (SegmentParams::default(), "no threshold"),
-            (SegmentParams { otsu: true, ..params() }, "exclude"),
-            (SegmentParams { upper: Some(100.0), ..params() }, "above upper"),
-            (SegmentParams { gaussian_voxels: -1.0, ..params() }, "found -1"),
-            (SegmentParams { lower: Some(5000.0), ..Default::default() }, "run from 100 to 500"),
-            (SegmentParams { crop: Some([[0, 10], [5, 5], [0, 8]]), ..params() }, "5:5"),
             (
-                SegmentParams { voi: Voi::Cylinder { diameter_mm: Some(2.0), center_mm: None }, ..params() },
+                SegmentParams {
+                    otsu: true,
+                    ..params()
+                },
+                "exclude",
+            ),
+            (
+                SegmentParams {
+                    upper: Some(100.0),
+                    ..params()
+                },
+                "above upper",
+            ),
+            (
+                SegmentParams {
+                    gaussian_voxels: -1.0,
+                    ..params()
+                },
+                "found -1",
+            ),
+            (
+                SegmentParams {
+                    lower: Some(5000.0),
+                    ..Default::default()
+                },
+                "run from 100 to 500",
+            ),
+            (
+                SegmentParams {
+                    crop: Some([[0, 10], [5, 5], [0, 8]]),
+                    ..params()
+                },
+                "5:5",
+            ),
+            (
+                SegmentParams {
+                    voi: Voi::Cylinder {
+                        diameter_mm: Some(2.0),
+                        center_mm: None,
+                    },
+                    ..params()
+                },
                 "does not lie in",
             ),
         ];
         for (params, expected) in cases {
-            let e = segment("bar", &scan(), &params, None).unwrap_err().to_string();
-            assert!(e.contains(expected) && e.contains("what to do"), "{expected}: {e}");
+            let e = segment("bar", &scan(), &params, None)
+                .unwrap_err()
+                .to_string();
+            assert!(
+                e.contains(expected) && e.contains("what to do"),
+                "{expected}: {e}"
+            );
         }
     }
 
     #[test]
     fn otsu_finds_the_bar() {
-        let p = SegmentParams { otsu: true, ..Default::default() };
+        let p = SegmentParams {
+            otsu: true,
+            ..Default::default()
+        };
         let s = segment("bar", &scan(), &p, None).unwrap().summary;
         assert_eq!(s.bone_voxels, 72);
         assert!((s.lower.unwrap() - 300.0).abs() < 1.0);

@@ -12,7 +12,10 @@ pub(super) fn check_crop(crop: &[[usize; 2]; 3], n: [usize; 3]) -> Result<()> {
             let axis = ["x", "y", "z"][a];
             return Err(Error::setting(
                 "crop",
-                format!("{from}:{to} along {axis}, where the scan has voxels 0:{}", n[a]),
+                format!(
+                    "{from}:{to} along {axis}, where the scan has voxels 0:{}",
+                    n[a]
+                ),
                 "give first and past-the-last voxel along x, y, z, as 0:100,0:100,20:180",
             ));
         }
@@ -28,7 +31,10 @@ pub(super) fn inside<'a>(
 ) -> Result<(Inside<'a>, String)> {
     match voi {
         Voi::Box => Ok((Inside::Box, "box".into())),
-        Voi::Cylinder { diameter_mm, center_mm } => {
+        Voi::Cylinder {
+            diameter_mm,
+            center_mm,
+        } => {
             let size = grid.size_mm();
             let diameter_mm = diameter_mm.unwrap_or(size[0].min(size[1]));
             let center_mm = center_mm
@@ -37,7 +43,8 @@ pub(super) fn inside<'a>(
             let out = (0..2).any(|a| {
                 let reach = diameter_mm / 2.0;
                 // A voxel of slack: diameters are typed rounded.
-                center_mm[a] - reach < -grid.spacing_mm[a] || center_mm[a] + reach > size[a] + grid.spacing_mm[a]
+                center_mm[a] - reach < -grid.spacing_mm[a]
+                    || center_mm[a] + reach > size[a] + grid.spacing_mm[a]
             });
             if out || diameter_mm.is_nan() || diameter_mm <= 0.0 {
                 return Err(Error::setting(
@@ -50,21 +57,37 @@ pub(super) fn inside<'a>(
                 ));
             }
             let words = format!("cylinder d={} mm", rounded(diameter_mm));
-            Ok((Inside::Cylinder { center_mm, diameter_mm }, words))
+            Ok((
+                Inside::Cylinder {
+                    center_mm,
+                    diameter_mm,
+                },
+                words,
+            ))
         }
         Voi::Mask(path) => {
             let shown = path.display();
             match mask {
                 Some(mask) if mask.grid.n == grid.n => Ok((
                     Inside::Mask(mask),
-                    format!("mask {}", path.file_name().unwrap_or_default().to_string_lossy()),
+                    format!(
+                        "mask {}",
+                        path.file_name().unwrap_or_default().to_string_lossy()
+                    ),
                 )),
                 Some(mask) => Err(Error::setting(
                     "voi",
-                    format!("{shown} has {:?} voxels, the scan has {:?}", mask.grid.n, grid.n),
+                    format!(
+                        "{shown} has {:?} voxels, the scan has {:?}",
+                        mask.grid.n, grid.n
+                    ),
                     "give a mask on the scan's own grid",
                 )),
-                None => Err(Error::setting("voi", format!("{shown} was not read"), "give a mask file that exists")),
+                None => Err(Error::setting(
+                    "voi",
+                    format!("{shown} was not read"),
+                    "give a mask file that exists",
+                )),
             }
         }
     }
@@ -74,4 +97,3 @@ pub(super) fn inside<'a>(
 fn rounded(v: f64) -> f64 {
     (v * 1e4).round() / 1e4
 }
-

@@ -19,7 +19,11 @@ pub(super) fn grey_range(scan: &Volume<f32>) -> Result<Grey> {
         .as_slice()
         .par_chunks(1 << 16)
         .map(|values| {
-            let mut grey = Grey { min: f32::INFINITY, max: f32::NEG_INFINITY, non_finite: 0 };
+            let mut grey = Grey {
+                min: f32::INFINITY,
+                max: f32::NEG_INFINITY,
+                non_finite: 0,
+            };
             for &v in values {
                 if v.is_finite() {
                     grey.min = grey.min.min(v);
@@ -31,7 +35,11 @@ pub(super) fn grey_range(scan: &Volume<f32>) -> Result<Grey> {
             grey
         })
         .reduce(
-            || Grey { min: f32::INFINITY, max: f32::NEG_INFINITY, non_finite: 0 },
+            || Grey {
+                min: f32::INFINITY,
+                max: f32::NEG_INFINITY,
+                non_finite: 0,
+            },
             |a, b| Grey {
                 min: a.min.min(b.min),
                 max: a.max.max(b.max),
@@ -39,7 +47,10 @@ pub(super) fn grey_range(scan: &Volume<f32>) -> Result<Grey> {
             },
         );
     if grey.min > grey.max {
-        return Err(Error::specimen("no voxel has a finite grey value", "check how the scan was exported"));
+        return Err(Error::specimen(
+            "no voxel has a finite grey value",
+            "check how the scan was exported",
+        ));
     }
     Ok(grey)
 }
@@ -50,7 +61,11 @@ fn clean(grey: &Grey) -> impl Fn(f32) -> f32 + Sync {
     move |v| if v.is_finite() { v } else { darkest }
 }
 
-pub(super) fn window(scan: &Volume<f32>, params: &SegmentParams, grey: &Grey) -> Result<(Option<f64>, Option<f64>)> {
+pub(super) fn window(
+    scan: &Volume<f32>,
+    params: &SegmentParams,
+    grey: &Grey,
+) -> Result<(Option<f64>, Option<f64>)> {
     if !params.otsu {
         return Ok((params.lower, params.upper));
     }
@@ -72,8 +87,17 @@ pub(super) fn window(scan: &Volume<f32>, params: &SegmentParams, grey: &Grey) ->
         })
 }
 
-pub(super) fn select(scan: &Volume<f32>, sigma: f64, grey: &Grey, lower: Option<f64>, upper: Option<f64>) -> Volume<u8> {
-    let (lower, upper) = (lower.unwrap_or(f64::NEG_INFINITY), upper.unwrap_or(f64::INFINITY));
+pub(super) fn select(
+    scan: &Volume<f32>,
+    sigma: f64,
+    grey: &Grey,
+    lower: Option<f64>,
+    upper: Option<f64>,
+) -> Volume<u8> {
+    let (lower, upper) = (
+        lower.unwrap_or(f64::NEG_INFINITY),
+        upper.unwrap_or(f64::INFINITY),
+    );
     let plane = scan.grid.n[0] * scan.grid.n[1];
     let raw = scan.as_slice();
     let slabs = gaussian::map_slabs(scan, sigma, clean(grey), |slices, values| {
@@ -90,7 +114,10 @@ pub(super) fn select(scan: &Volume<f32>, sigma: f64, grey: &Grey, lower: Option<
 }
 
 pub(super) fn count(bone: &Volume<u8>) -> u64 {
-    bone.as_slice().par_chunks(1 << 16).map(|c| c.iter().map(|&v| u64::from(v)).sum::<u64>()).sum()
+    bone.as_slice()
+        .par_chunks(1 << 16)
+        .map(|c| c.iter().map(|&v| u64::from(v)).sum::<u64>())
+        .sum()
 }
 
 pub(super) fn nothing_selected(lower: Option<f64>, upper: Option<f64>, grey: &Grey) -> Error {
@@ -106,4 +133,3 @@ pub(super) fn nothing_selected(lower: Option<f64>, upper: Option<f64>, grey: &Gr
         "choose a window inside that range (image's own units), or --otsu",
     )
 }
-

@@ -4,3 +4,4 @@ mod cli;
 mod laws;
 mod layers;
 mod patch;
+mod segment;

@@ -36,7 +36,17 @@ fn the_real_stack_gives_the_published_count_of_bone_voxels() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
     let (code, stdout, stderr) = run(&[
-        "segment", text(&stack), "-o", text(&out), "--spacing", "0.0195", "--gaussian", "1", "--lower", "63", "--json",
+        "segment",
+        text(&stack),
+        "-o",
+        text(&out),
+        "--spacing",
+        "0.0195",
+        "--gaussian",
+        "1",
+        "--lower",
+        "63",
+        "--json",
     ]);
     assert_eq!(code, 0, "{stderr}");
     let record: serde_json::Value = serde_json::from_str(&stdout).unwrap();
@@ -68,7 +78,15 @@ fn a_dry_run_writes_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let (scan, out) = (dir.path().join("bar.nii.gz"), dir.path().join("out"));
     bar(&scan);
-    let (code, _, stderr) = run(&["segment", text(&scan), "-o", text(&out), "--lower", "300", "--dry-run"]);
+    let (code, _, stderr) = run(&[
+        "segment",
+        text(&scan),
+        "-o",
+        text(&out),
+        "--lower",
+        "300",
+        "--dry-run",
+    ]);
     assert_eq!(code, 0, "{stderr}");
     assert!(stderr.contains("160 bone voxels"), "{stderr}");
     assert!(!out.exists());
@@ -83,7 +101,10 @@ fn refused(input: &Path, more: &[&str], expected: &[&str]) {
     let (code, _, stderr) = run(&args);
     assert_eq!(code, 2, "{args:?}: {stderr}");
     for words in expected.iter().chain(&["what to do"]) {
-        assert!(stderr.contains(words), "{args:?} should say `{words}`: {stderr}");
+        assert!(
+            stderr.contains(words),
+            "{args:?} should say `{words}`: {stderr}"
+        );
     }
     assert!(!out.exists(), "{args:?} left something behind");
 }
@@ -97,9 +118,21 @@ fn bad_input_is_refused_and_leaves_nothing_behind() {
     refused(&at("absent.nii"), &["--lower", "1"], &["absent.nii"]);
     refused(&scan, &[], &["no threshold"]);
     refused(&scan, &["--lower", "5000"], &["run from 100 to 500"]);
-    refused(&scan, &["--lower", "300", "--crop", "0:20,0:5,0:5"], &["crop", "0:12"]);
-    refused(&scan, &["--lower", "300", "--voi", "cylinder:3"], &["cylinder"]);
-    refused(&scan, &["--lower", "300", "--voi", text(&at("no-mask.nii"))], &["no-mask.nii"]);
+    refused(
+        &scan,
+        &["--lower", "300", "--crop", "0:20,0:5,0:5"],
+        &["crop", "0:12"],
+    );
+    refused(
+        &scan,
+        &["--lower", "300", "--voi", "cylinder:3"],
+        &["cylinder"],
+    );
+    refused(
+        &scan,
+        &["--lower", "300", "--voi", text(&at("no-mask.nii"))],
+        &["no-mask.nii"],
+    );
 
     let bytes = std::fs::read(&scan).unwrap();
     for keep in [10, 100, bytes.len() - 20] {
@@ -129,7 +162,11 @@ fn slices_of_mixed_sizes_and_slices_without_a_size_are_refused() {
     }
     refused(dir.path(), &["--lower", "1"], &["voxel size", "--spacing"]);
     slice(&dir.path().join("s3.tif"), 6, 5);
-    refused(dir.path(), &["--lower", "1", "--spacing", "0.02"], &["s3.tif", "6 × 5", "6 × 4"]);
+    refused(
+        dir.path(),
+        &["--lower", "1", "--spacing", "0.02"],
+        &["s3.tif", "6 × 5", "6 × 4"],
+    );
 }
 
 #[test]

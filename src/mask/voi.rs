@@ -59,7 +59,8 @@ impl Inside<'_> {
             } => rows
                 .map(|(r, voxels)| {
                     let y = ((r % grid.n[1]) as f64 + 0.5) * grid.spacing_mm[1] - center_mm[1];
-                    let reach = diameter_mm * diameter_mm / 4.0 - y * y;
+                    // A hair more, so that rounding does not decide about centres that lie on the circle.
+                    let reach = diameter_mm * diameter_mm / 4.0 * (1.0 + 1e-9) - y * y;
                     clear(voxels, |i| {
                         let x = (i as f64 + 0.5) * grid.spacing_mm[0] - center_mm[0];
                         x * x <= reach

@@ -2,3 +2,6 @@
 
 pub mod hex8;
 pub mod lattice;
+//! Energies and forces, one folder or file a physics. No physics imports another, and none knows a solver.
+
+pub mod anisotropic;

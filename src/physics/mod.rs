@@ -5,3 +5,4 @@ pub mod lattice;
 //! Energies and forces, one folder or file a physics. No physics imports another, and none knows a solver.
 
 pub mod anisotropic;
+pub mod lattice;

@@ -155,6 +155,11 @@ impl Family {
         )
     }
 
+    /// The neighbour, and the number of the stencil's bond, at place `b` of the list.
+    pub fn kind(&self, b: usize) -> (usize, usize) {
+        (self.neighbour[b] as usize, self.bond[b] as usize)
+    }
+
     /// Neighbours of point `i` with the stencil's bond to each.
     pub fn of(&self, i: usize) -> impl Iterator<Item = (usize, &Bond)> {
         self.range(i).map(|b| self.entry(b))

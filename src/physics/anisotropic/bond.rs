@@ -1,4 +1,6 @@
-//! Owns the pair as physics sees it: direction, length and partial volume of the far point.
+//! Owns the pair as physics sees it: its geometry, its moduli, its deformation, and what it adds to a stiffness.
+
+use crate::topology::family::Stencil;
 
 /// One bond of a point's family.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,29 +24,108 @@ impl Bond {
     }
 }
 
-/// The full family of a point of a square grid, horizon `m` spacings, lower half first: offsets at distances up to
-/// δ + Δ/2 with Hu's partial volumes α = clip((δ + Δ/2 - L)/Δ, 0, 1), or those within δ in full.
-pub fn full_family(m: f64, spacing_mm: f64, partial: bool) -> Vec<Bond> {
-    let reach = (m + 0.5).ceil() as i32;
-    let mut bonds = Vec::new();
-    for b in -reach..=reach {
-        for a in -reach..=reach {
-            let length = f64::from(a * a + b * b).sqrt();
-            let alpha = if partial {
-                (m + 0.5 - length).clamp(0.0, 1.0)
-            } else {
-                f64::from(u8::from(length <= m + 1e-9))
-            };
-            if (a, b) != (0, 0) && alpha > 1e-9 {
-                bonds.push(Bond {
-                    n: [f64::from(a) / length, f64::from(b) / length],
-                    length_mm: length * spacing_mm,
-                    volume_mm2: alpha * spacing_mm * spacing_mm,
-                });
-            }
+/// The bonds of a full family, in the stencil's order.
+pub fn bonds(stencil: &Stencil) -> Vec<Bond> {
+    let cell = stencil.spacing * stencil.spacing;
+    let bond = |b: &crate::topology::family::Bond| Bond {
+        n: b.xi.map(|x| x / b.length),
+        length_mm: b.length,
+        volume_mm2: b.share * cell,
+    };
+    stencil.bonds.iter().map(bond).collect()
+}
+
+/// Elastic law of the bonds of one direction and length: N/mm⁶ per mm of thickness.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Moduli {
+    pub axial: f64,
+    pub shear: f64,
+    pub bending: f64,
+}
+
+/// The pairwise deformations of eqs. 1-3.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deformation {
+    pub stretch: f64,
+    /// Rotation of the bond less the mean rotation of its ends.
+    pub shear: f64,
+    /// Curvature in 1/mm.
+    pub curvature: f64,
+}
+
+impl Bond {
+    /// Deformation under the values at its ends: displacements, and the rotation if there is a third value.
+    pub fn deformation<const D: usize>(&self, here: &[f64; D], there: &[f64; D]) -> Deformation {
+        let [x, y] = self.n;
+        let (e1, e2) = (there[0] - here[0], there[1] - here[1]);
+        let [a, b] = [here, there].map(|u| u.get(2).copied().unwrap_or(0.0));
+        Deformation {
+            stretch: (e1 * x + e2 * y) / self.length_mm,
+            shear: (e2 * x - e1 * y) / self.length_mm - 0.5 * (a + b),
+            curvature: (b - a) / self.length_mm,
         }
     }
-    bonds
+
+    /// Micropotential w = (L/2)(k_n s² + k_t γ² + k_b χ²) in N/mm⁵ per mm of thickness (eq. 4).
+    pub fn energy(&self, k: &Moduli, d: &Deformation) -> f64 {
+        0.5 * self.length_mm
+            * (k.axial * d.stretch * d.stretch
+                + k.shear * d.shear * d.shear
+                + k.bending * d.curvature * d.curvature)
+    }
+}
+
+/// What a bond from p to q adds to the rows of p: `own` to the block (p, p), `cross` to (p, q).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Blocks<const D: usize> {
+    pub own: [[f64; D]; D],
+    pub cross: [[f64; D]; D],
+}
+
+impl Bond {
+    /// Elastic blocks (eq. 37 with both bonds of a pair joined), N/mm per mm of thickness, for displacements (D = 2,
+    /// central forces only) or displacements and rotation (D = 3). `cell_mm2` is the volume of p.
+    pub fn stiffness<const D: usize>(&self, k: &Moduli, cell_mm2: f64) -> Blocks<D> {
+        let [x, y] = self.n;
+        let l = self.length_mm;
+        // Rows of B at p and at q: stretch, shear, curvature.
+        let fit = |row: [f64; 3]| -> [f64; D] { std::array::from_fn(|d| row[d]) };
+        let here = [
+            [-x / l, -y / l, 0.0],
+            [y / l, -x / l, -0.5],
+            [0.0, 0.0, -1.0 / l],
+        ]
+        .map(fit);
+        let there = [
+            [x / l, y / l, 0.0],
+            [-y / l, x / l, -0.5],
+            [0.0, 0.0, 1.0 / l],
+        ]
+        .map(fit);
+        let moduli = match D {
+            2 => [k.axial, 0.0, 0.0],
+            _ => [k.axial, k.shear, k.bending],
+        };
+        let weight = l * self.volume_mm2 * cell_mm2;
+        let block = |a: &[[f64; D]; 3], b: &[[f64; D]; 3]| -> [[f64; D]; D] {
+            let entry =
+                |i: usize, j: usize| (0..3).map(|m| moduli[m] * a[m][i] * b[m][j]).sum::<f64>();
+            std::array::from_fn(|i| std::array::from_fn(|j| weight * entry(i, j)))
+        };
+        Blocks {
+            own: block(&here, &here),
+            cross: block(&here, &there),
+        }
+    }
+
+    /// Conductance blocks: k α Δv Δv/L² (eq. 132).
+    pub fn conductance(&self, k: f64, cell_mm2: f64) -> Blocks<1> {
+        let g = k * self.volume_mm2 * cell_mm2 / (self.length_mm * self.length_mm);
+        Blocks {
+            own: [[g]],
+            cross: [[-g]],
+        }
+    }
 }
 
 #[cfg(test)]
@@ -54,20 +135,14 @@ mod tests {
     use crate::physics::anisotropic::tensor::PlaneTensor;
     use crate::physics::anisotropic::toughness::critical_energy;
 
-    /// 96 and 36 bonds, Σα 78.126525 and 27.388070 (independent prototype; 25π = 78.5398).
-    #[test]
-    fn families_of_three_and_five_spacings() {
-        for (m, count, sum) in [(5.0, 96, 78.126525), (3.0, 36, 27.388070)] {
-            let family = full_family(m, 1.0, true);
-            assert_eq!(family.len(), count);
-            assert!((family.iter().map(|b| b.volume_mm2).sum::<f64>() - sum).abs() < 2e-6);
-        }
+    fn full_family(m: f64) -> Vec<Bond> {
+        bonds(&Stencil::new(1.0, m, true).unwrap())
     }
 
     /// Stored energy of a homogeneous strain (ε11, ε22, 2 ε12) on a full family, C_disc by polarisation.
     fn stored(tensor: &PlaneTensor, m: f64, e: [f64; 3]) -> f64 {
         let k = Micromoduli::new(tensor, m);
-        full_family(m, 1.0, true)
+        full_family(m)
             .iter()
             .map(|b| {
                 let [c, s] = b.n;
@@ -161,7 +236,7 @@ mod tests {
     fn discrete_fracture_energy_of_a_lattice_plane() {
         let through = |m: f64, g0: f64, g90: f64, zeta_deg: f64| {
             let law = critical_energy(g0, g90, m, 8, 1, zeta_deg.to_radians()).unwrap();
-            full_family(m, 1.0, true)
+            full_family(m)
                 .iter()
                 .filter(|b| b.n[0] > 0.0)
                 .map(|b| (b.n[0] * b.length_mm).round() * law.at(b.psi()) * b.volume_mm2)

@@ -126,7 +126,8 @@ fn solve_three(mut a: [[f64; 4]; 3]) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::anisotropic::bond::full_family;
+    use crate::physics::anisotropic::bond::bonds;
+    use crate::topology::family::Stencil;
     use std::f64::consts::PI;
 
     fn paper_disc() -> Conductivity {
@@ -177,7 +178,7 @@ mod tests {
     }
 
     fn stencil_conductivity(m: f64, exponent: u32) -> ([[f64; 2]; 2], [f64; 3]) {
-        let bonds = full_family(m, 1.0, true);
+        let bonds = bonds(&Stencil::new(1.0, m, true).unwrap());
         let law = paper_disc().microconductivity(m, exponent).unwrap();
         let k: Vec<f64> = bonds.iter().map(|b| law.at(b.psi())).collect();
         (
@@ -217,7 +218,7 @@ mod tests {
             for (found, expected) in c.iter().zip(expected) {
                 assert!((found - expected).abs() < 2e-6, "m = {m}: {c:?}");
             }
-            let bonds = full_family(m, 1.0, true);
+            let bonds = bonds(&Stencil::new(1.0, m, true).unwrap());
             let law = paper_disc().microconductivity(m, 34).unwrap();
             let k: Vec<f64> = bonds
                 .iter()
@@ -234,7 +235,7 @@ mod tests {
 
     #[test]
     fn four_bonds_cannot_be_calibrated() {
-        let bonds = full_family(1.0, 1.0, false);
+        let bonds = bonds(&Stencil::new(1.0, 1.0, false).unwrap());
         let k = vec![1.0; bonds.len()];
         assert!(calibration(&bonds, &k, &paper_disc()).is_err());
     }

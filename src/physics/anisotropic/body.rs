@@ -99,13 +99,9 @@ impl<const D: usize> Operator<D> for Body<D> {
                 let p = chunk * CHUNK + k;
                 *out = [0.0; D];
                 for (q, kind, factor) in self.row(p) {
-                    let b = &self.blocks[kind];
-                    for i in 0..D {
-                        let mut sum = 0.0;
-                        for j in 0..D {
-                            sum += b.own[i][j] * x[p][j] + b.cross[i][j] * x[q][j];
-                        }
-                        out[i] += factor * sum;
+                    let force = self.blocks[kind].apply(&x[p], &x[q]);
+                    for (sum, f) in out.iter_mut().zip(force) {
+                        *sum += factor * f;
                     }
                 }
             }

@@ -82,6 +82,17 @@ pub struct Blocks<const D: usize> {
     pub cross: [[f64; D]; D],
 }
 
+impl<const D: usize> Blocks<D> {
+    /// Force on the near end under the values at both.
+    pub fn apply(&self, here: &[f64; D], there: &[f64; D]) -> [f64; D] {
+        std::array::from_fn(|i| {
+            (0..D)
+                .map(|j| self.own[i][j] * here[j] + self.cross[i][j] * there[j])
+                .sum()
+        })
+    }
+}
+
 impl Bond {
     /// Elastic blocks (eq. 37 with both bonds of a pair joined), N/mm per mm of thickness, for displacements (D = 2,
     /// central forces only) or displacements and rotation (D = 3). `cell_mm2` is the volume of p.

@@ -153,7 +153,7 @@ fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
 fn condensed(c6: &[[f64; 6]; 6], keep: [usize; 3]) -> Result<[[f64; 3]; 3]> {
     let mut c = *c6;
     for k in (0..6).filter(|k| !keep.contains(k)) {
-        if !(c[k][k] > 0.0) {
+        if c[k][k].is_nan() || c[k][k] <= 0.0 {
             return Err(Error::specimen(
                 "the 6 x 6 stiffness is not positive definite",
                 "give the stiffness in MPa, Voigt order 11, 22, 33, 23, 13, 12",

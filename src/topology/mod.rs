@@ -3,8 +3,8 @@
 pub mod dissection;
 pub mod family;
 pub mod layers;
-pub mod outline;
 pub mod loaded;
+pub mod outline;
 pub mod placement;
 pub mod plane;
 pub mod sites;

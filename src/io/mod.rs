@@ -2,8 +2,6 @@
 
 pub mod atomic;
 pub mod lammps;
-pub mod table;
-pub mod vtk;
 pub mod nifti;
 pub mod orient;
 pub mod picture;
@@ -12,4 +10,6 @@ pub mod scan;
 pub mod slices;
 pub mod specimen;
 pub mod table;
+pub mod table;
 pub mod tiff;
+pub mod vtk;

@@ -10,6 +10,5 @@ pub mod scan;
 pub mod slices;
 pub mod specimen;
 pub mod table;
-pub mod table;
 pub mod tiff;
 pub mod vtk;

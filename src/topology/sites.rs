@@ -175,11 +175,12 @@ fn reached(
     while let Some(c) = queue.pop() {
         let at = frame.indices(c);
         for b in 0..stencil.coordination() {
-            if let Some(n) = step(frame, at, stencil.direction(b)) {
-                if weights[n] > 0.0 && !seen[n] {
-                    seen[n] = true;
-                    queue.push(n);
-                }
+            if let Some(n) = step(frame, at, stencil.direction(b))
+                && weights[n] > 0.0
+                && !seen[n]
+            {
+                seen[n] = true;
+                queue.push(n);
             }
         }
     }

@@ -78,10 +78,10 @@ fn supports(sites: &Sites, params: &SolveParams, displacement_mm: f64) -> (Held,
     let grips = sites.grips;
     let mut held = Held::none(sites.len());
     let mut u = vec![[0.0; 3]; sites.len()];
-    for s in 0..sites.len() {
+    for (s, u) in u.iter_mut().enumerate() {
         let plane = sites.plane(s);
         let along = f64::from(plane.clamp(grips.low, grips.high) - grips.low);
-        u[s][axis] = displacement_mm * along / f64::from(grips.high - grips.low);
+        u[axis] = displacement_mm * along / f64::from(grips.high - grips.low);
         let gripped = grips.holds(plane);
         for c in 0..3 {
             let confined = params.load == Load::Confined && c != axis && sites.on_side(s, c);

@@ -2,6 +2,10 @@
 
 pub mod atomic;
 pub mod lammps;
+pub mod markdown;
+pub mod plot;
+pub mod table;
+pub mod vtk;
 pub mod nifti;
 pub mod orient;
 pub mod picture;

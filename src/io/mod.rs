@@ -3,12 +3,10 @@
 pub mod atomic;
 pub mod lammps;
 pub mod markdown;
-pub mod plot;
-pub mod table;
-pub mod vtk;
 pub mod nifti;
 pub mod orient;
 pub mod picture;
+pub mod plot;
 pub mod raw;
 pub mod scan;
 pub mod slices;

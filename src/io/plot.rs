@@ -11,7 +11,7 @@ use kuva::plot::boxplot::BoxPlot;
 use kuva::plot::legend::LegendPosition;
 use kuva::plot::line::{LinePlot, LineStyle};
 use kuva::plot::scatter::{MarkerShape, ScatterPlot};
-use kuva::render::layout::Layout;
+use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::render::{Scene, render_multiple};
 
@@ -81,12 +81,20 @@ fn layout(figure: &Figure, plots: &[Plot]) -> Layout {
         .with_tick_size(12)
         .with_body_size(12);
     if figure.x.log {
-        layout = layout.with_log_x();
+        layout = layout.with_log_x().with_x_tick_format(plain_ticks());
     }
     if figure.y.log {
-        layout = layout.with_log_y();
+        layout = layout.with_log_y().with_y_tick_format(plain_ticks());
     }
     layout
+}
+
+/// 0.1, 0.2, 10: what a reader of a log axis expects.
+fn plain_ticks() -> TickFormat {
+    TickFormat::Custom(std::sync::Arc::new(|v| match v {
+        v if (1e-4..1e6).contains(&v) => format!("{}", (v * 1e6).round() / 1e6),
+        v => format!("{v:e}"),
+    }))
 }
 
 fn plots_of(curve: &Curve) -> Vec<Plot> {
@@ -130,7 +138,7 @@ fn markers(curve: &Curve, hue: &str) -> ScatterPlot {
     let plot = ScatterPlot::new()
         .with_data(pairs(&curve.points))
         .with_color(hue)
-        .with_size(4.5)
+        .with_size(4.0)
         .with_marker(MARKERS[curve.shape % MARKERS.len()]);
     match curve.points.iter().any(|p| p.y_error.is_some()) {
         true => plot.with_y_err_asymmetric(errors),

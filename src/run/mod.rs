@@ -1,6 +1,7 @@
 //! Recipes on real scans: each verb of the program is one function here, from paths and settings to files.
 
 pub mod cohort;
+pub mod host;
 pub mod info;
 pub mod lattice;
 pub mod meter;

@@ -1,19 +1,48 @@
 //! Owns the results of one scan on disk: `results.csv`, one row per solve, and the same with provenance in
-//! `results.json`. Both are written whole after each solve; what is there for the same mask and version is not redone.
+//! `results.json`. Both are written whole after each solve; what is there for the same mask, settings and version is not
+//! redone.
 
 use crate::error::{Error, Result};
 use crate::io::{atomic, table};
-use crate::measure::ffb::{settings_of, with_ffb};
+use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
+use crate::run::host;
+use crate::stage::solve::SolveParams;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-#[derive(Debug, Serialize, Deserialize)]
+/// The content of `results.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Record {
+    provenance: Provenance,
+    rows: Vec<KeyedRow>,
+}
+
+/// Where results come from, enough to make them again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Provenance {
+    program: String,
     version: String,
+    /// Of the last solve, in UTC.
+    date: String,
+    host: String,
+    threads: usize,
     /// BLAKE3 of `mask.nii.gz`: rows of another mask are not these.
     mask_blake3: String,
-    rows: Vec<Row>,
+    /// `segment.json` as it was: the input, its hash, the settings.
+    segment: Value,
+}
+
+/// A row; for a solved one with the settings it follows from and their key. Means have neither.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct KeyedRow {
+    #[serde(flatten)]
+    row: Row,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    key: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    settings: Option<SolveParams>,
 }
 
 /// The rows of one scan's folder.
@@ -29,6 +58,82 @@ impl Results {
     /// # Errors
     /// A mask that cannot be read.
     pub fn open(dir: &Path, redo: bool) -> Result<Self> {
+        let provenance = Provenance::now(dir)?;
+        let old = std::fs::read(dir.join("results.json")).ok();
+        let old: Option<Record> = old.and_then(|text| serde_json::from_slice(&text).ok());
+        let same = |r: &Record| {
+            r.provenance.mask_blake3 == provenance.mask_blake3
+                && r.provenance.version == provenance.version
+        };
+        let mut rows = old
+            .filter(|r| !redo && same(r))
+            .map_or(Vec::new(), |r| r.rows);
+        // Means are made anew from what was solved.
+        rows.retain(|row| row.key.is_some());
+        Ok(Results {
+            dir: dir.to_path_buf(),
+            record: Record { provenance, rows },
+        })
+    }
+
+    /// The converged row that follows from the same settings, if it was made before. `blank` is the row before its
+    /// solve.
+    pub fn find(&self, blank: &Row, params: &SolveParams) -> Option<Row> {
+        let key = Some(key(blank, params));
+        let same = |old: &&KeyedRow| old.key == key && old.row.converged == Some(true);
+        self.record
+            .rows
+            .iter()
+            .find(same)
+            .map(|old| old.row.clone())
+    }
+
+    /// Keeps a solved row, in place of an older one of the same settings, and writes both files.
+    pub fn keep(&mut self, blank: &Row, params: &SolveParams, row: &Row) -> Result<()> {
+        let new = KeyedRow {
+            row: row.clone(),
+            key: Some(key(blank, params)),
+            settings: Some(params.clone()),
+        };
+        match self.record.rows.iter_mut().find(|old| old.key == new.key) {
+            Some(old) => *old = new,
+            None => self.record.rows.push(new),
+        }
+        self.write()
+    }
+
+    fn write(&self) -> Result<()> {
+        let solved: Vec<Row> = self
+            .record
+            .rows
+            .iter()
+            .map(|keyed| keyed.row.clone())
+            .collect();
+        let rows = with_ffb(&solved);
+        let mut solved = self.record.rows.iter();
+        let keyed = |row: &Row| match row.boundary.as_deref() {
+            Some("ffb") => KeyedRow {
+                row: row.clone(),
+                key: None,
+                settings: None,
+            },
+            _ => solved
+                .next()
+                .expect("means are added, nothing is removed")
+                .clone(),
+        };
+        let record = Record {
+            provenance: self.record.provenance.clone(),
+            rows: rows.iter().map(keyed).collect(),
+        };
+        let text = serde_json::to_string_pretty(&record).expect("plain data");
+        atomic::write(&self.dir.join("results.json"), text)?;
+        table::write(&self.dir.join("results.csv"), &rows)
+    }
+}
+
+impl Provenance {
+    fn now(dir: &Path) -> Result<Self> {
         let mask = dir.join("mask.nii.gz");
         let bytes = std::fs::read(&mask).map_err(|e| {
             Error::file(
@@ -37,46 +142,106 @@ impl Results {
                 "run `bonepd-ct segment` first",
             )
         })?;
-        let mask_blake3 = blake3::hash(&bytes).to_hex().to_string();
-        let version = env!("CARGO_PKG_VERSION").to_owned();
-        let old = std::fs::read(dir.join("results.json")).ok();
-        let old: Option<Record> = old.and_then(|text| serde_json::from_slice(&text).ok());
-        let same = |r: &Record| r.mask_blake3 == mask_blake3 && r.version == version;
-        let rows = old
-            .filter(|r| !redo && same(r))
-            .map_or(Vec::new(), |r| r.rows);
-        let record = Record {
-            version,
-            mask_blake3,
-            rows,
-        };
-        Ok(Results {
-            dir: dir.to_path_buf(),
-            record,
+        let segment = std::fs::read(dir.join("segment.json")).unwrap_or_default();
+        Ok(Provenance {
+            program: env!("CARGO_PKG_NAME").to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            date: host::date(),
+            host: host::name(),
+            threads: rayon::current_num_threads(),
+            mask_blake3: blake3::hash(&bytes).to_hex().to_string(),
+            segment: serde_json::from_slice(&segment).unwrap_or_default(),
         })
     }
+}
 
-    /// The converged row of the same settings, if it was made before.
-    pub fn find(&self, blank: &Row) -> Option<Row> {
-        let same =
-            |row: &&Row| row.boundary == blank.boundary && settings_of(row) == settings_of(blank);
-        self.record
-            .rows
-            .iter()
-            .find(|row| same(row) && row.converged == Some(true))
-            .cloned()
+/// What a row follows from, beside the mask and the version: its lattice and all settings, also those without a column.
+fn key(blank: &Row, params: &SolveParams) -> String {
+    let all = serde_json::json!([blank, params]);
+    blake3::hash(all.to_string().as_bytes()).to_hex()[..32].to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blank(boundary: &str) -> Row {
+        Row {
+            boundary: Some(boundary.to_owned()),
+            ..Row::default()
+        }
     }
 
-    /// Keeps a row, in place of an older one of the same settings, and writes both files.
-    pub fn keep(&mut self, row: &Row) -> Result<()> {
-        let same = |old: &Row| old.boundary == row.boundary && settings_of(old) == settings_of(row);
-        match self.record.rows.iter_mut().find(|old| same(old)) {
-            Some(old) => *old = row.clone(),
-            None => self.record.rows.push(row.clone()),
+    fn solved(boundary: &str, e: f64) -> Row {
+        Row {
+            e_app_mpa: Some(e),
+            converged: Some(true),
+            ..blank(boundary)
         }
-        self.record.rows = with_ffb(&self.record.rows);
-        let text = serde_json::to_string_pretty(&self.record).expect("plain data");
-        atomic::write(&self.dir.join("results.json"), text)?;
-        table::write(&self.dir.join("results.csv"), &self.record.rows)
+    }
+
+    fn folder() -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("mask.nii.gz"), "mask").unwrap();
+        dir
+    }
+
+    #[test]
+    fn rows_are_found_again_for_the_same_settings_only() {
+        let dir = folder();
+        let params = SolveParams::default();
+        let mut results = Results::open(dir.path(), false).unwrap();
+        results
+            .keep(&blank("firm"), &params, &solved("firm", 1.0 / 3.0))
+            .unwrap();
+        results
+            .keep(&blank("floppy"), &params, &solved("floppy", 0.1))
+            .unwrap();
+
+        let again = Results::open(dir.path(), false).unwrap();
+        assert_eq!(
+            again.find(&blank("firm"), &params),
+            Some(solved("firm", 1.0 / 3.0))
+        );
+        let tighter = SolveParams {
+            tolerance: 1e-6,
+            ..params.clone()
+        };
+        assert_eq!(again.find(&blank("firm"), &tighter), None);
+        let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
+        assert_eq!(table.len(), 3);
+        assert_eq!(table[2].boundary.as_deref(), Some("ffb"));
+
+        assert_eq!(
+            Results::open(dir.path(), true)
+                .unwrap()
+                .find(&blank("firm"), &params),
+            None
+        );
+        std::fs::write(dir.path().join("mask.nii.gz"), "another").unwrap();
+        assert_eq!(
+            Results::open(dir.path(), false)
+                .unwrap()
+                .find(&blank("firm"), &params),
+            None
+        );
+    }
+
+    #[test]
+    fn a_row_that_did_not_converge_is_solved_again_and_replaced() {
+        let dir = folder();
+        let params = SolveParams::default();
+        let mut results = Results::open(dir.path(), false).unwrap();
+        let stalled = Row {
+            converged: Some(false),
+            ..solved("firm", 2.0)
+        };
+        results.keep(&blank("firm"), &params, &stalled).unwrap();
+        assert_eq!(results.find(&blank("firm"), &params), None);
+        results
+            .keep(&blank("firm"), &params, &solved("firm", 1.0))
+            .unwrap();
+        let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
+        assert_eq!(table, [solved("firm", 1.0)]);
     }
 }

@@ -33,13 +33,22 @@ pub fn solve(
     let mut results = Results::open(dir, session.force)?;
     let mut rows = Vec::new();
     for case in lattice.cases() {
-        let row = match results.find(&blank(&specimen, &case, params)) {
+        let blank = blank(&specimen, &case, params);
+        let row = match results.find(&blank, params) {
             Some(row) => row,
-            None if session.dry_run => continue,
+            None if session.dry_run => {
+                session.say(format!(
+                    "would solve {} {} {} mm",
+                    blank.structure,
+                    case.boundary.name(),
+                    case.lp_mm
+                ));
+                continue;
+            }
             None => solve_case(&specimen, &case, params, session)?,
         };
         session.say(in_words(&row));
-        results.keep(&row)?;
+        results.keep(&blank, params, &row)?;
         rows.push(row);
     }
     Ok(with_ffb(&rows))

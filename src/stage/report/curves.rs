@@ -189,7 +189,7 @@ pub fn wall_time(rows: &[Row]) -> Option<Figure> {
         caption: "Wall time of one solve against lattice parameter (element size for voxel FE): median over scans; \
                   bars reach from the fastest to the slowest."
             .to_owned(),
-        x: Axis::log("lattice parameter (mm)"),
+        x: Axis::linear("lattice parameter (mm)"),
         y: Axis::log("wall time (s)"),
         content: Content::Curves(curves),
     })

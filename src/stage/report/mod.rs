@@ -203,7 +203,10 @@ mod tests {
         };
         let coarse = row("a", "floppy", 0.1, 30.0);
         assert_eq!(stems(&[]), Vec::<String>::new());
-        assert_eq!(stems(&[coarse.clone()]), ["convergence-a", "wall-time"]);
+        assert_eq!(
+            stems(std::slice::from_ref(&coarse)),
+            ["convergence-a", "wall-time"]
+        );
         assert_eq!(
             stems(&[coarse.clone(), fine, row("b", "floppy", 0.1, 10.0)]),
             [

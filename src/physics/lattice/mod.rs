@@ -7,88 +7,21 @@
 //!
 //! with `w_i = 1`, or the bone fraction of the site's cell on graded lattices.
 
-use crate::error::{Error, Result};
+pub mod moduli;
+
+mod kernel;
+pub mod multigrid;
+mod quad;
+
 use crate::operator::Operator;
-use crate::par::{CHUNK, sum_chunks};
+use crate::par::sum_chunks;
+use crate::simd::{Isa, isa};
 use crate::topology::sites::Sites;
-use crate::topology::stencil::Structure;
+use kernel::Bonds;
+pub use moduli::{Moduli, check_solid};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Mutex;
-
-/// Moduli of a lattice: springs of both shells and the volumetric one, all in N/mm.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moduli {
-    pub k: [f64; 2],
-    pub t: f64,
-}
-
-impl Moduli {
-    /// Eq 7: the lattice whose fully bonded site stores the energy of the isotropic solid (E in MPa, ν) exactly.
-    ///
-    /// # Errors
-    /// E or ν outside the solid's range, or ν below the lattice's: a site's energy stays non-negative only while
-    /// `k_s + N_s T >= 0` on both shells (SC ν ≥ −½, BCC ν ≥ −⅝, FCC ν ≥ 0).
-    pub fn new(structure: Structure, lp_mm: f64, young_mpa: f64, poisson: f64) -> Result<Self> {
-        check_solid(young_mpa, poisson)?;
-        let least = match structure {
-            Structure::Sc => -0.5,
-            Structure::Bcc => -0.625,
-            Structure::Fcc => 0.0,
-        };
-        if poisson < least {
-            return Err(Error::setting(
-                "poisson",
-                format!(
-                    "a {} lattice is stable for ν >= {least}, found {poisson}: below it a site's energy can be negative",
-                    structure.name().to_uppercase()
-                ),
-                "use sc or bcc for ν < 0, or the voxel-fe method",
-            ));
-        }
-        let (nu, le) = (poisson, lp_mm * young_mpa);
-        let shear = le / (1.0 + nu);
-        let volumetric = if nu == 0.25 {
-            0.0
-        } else {
-            le * (4.0 * nu - 1.0) / ((1.0 + nu) * (1.0 - 2.0 * nu))
-        };
-        Ok(match structure {
-            Structure::Sc => Moduli {
-                k: [shear, shear],
-                t: volumetric / 18.0,
-            },
-            Structure::Bcc => Moduli {
-                k: [1.5 * shear, shear],
-                t: 3.0 * volumetric / 28.0,
-            },
-            Structure::Fcc => Moduli {
-                k: [shear, 0.25 * shear],
-                t: volumetric / 24.0,
-            },
-        })
-    }
-}
-
-/// Refuses moduli no isotropic solid has.
-pub fn check_solid(young_mpa: f64, poisson: f64) -> Result<()> {
-    if !(young_mpa > 0.0 && young_mpa.is_finite()) {
-        return Err(Error::setting(
-            "young_mpa",
-            format!("expected a positive modulus in MPa, found {young_mpa}"),
-            "give the tissue's Young's modulus, such as 1000",
-        ));
-    }
-    if !(poisson > -1.0 && poisson < 0.5) {
-        return Err(Error::setting(
-            "poisson",
-            format!(
-                "expected -1 < ν < 0.5, found {poisson}: at 0.5 the solid is incompressible and the moduli are infinite"
-            ),
-            "use a value such as 0.3, or 0.49 for nearly incompressible tissue",
-        ));
-    }
-    Ok(())
-}
 
 /// One opposite pair of bonds: its direction in grid steps and the moduli scaled for it.
 #[derive(Debug, Clone, Copy)]
@@ -101,11 +34,20 @@ struct Pair {
     half: f64,
 }
 
+/// Sites a task takes at once: a few hundred kilobytes of what it reads.
+const PORTION: usize = 1024;
+
+/// Sites of portion `c`, which is `len` long.
+fn range(c: usize, len: usize) -> Range<usize> {
+    c * PORTION..c * PORTION + len
+}
+
 /// The linearised lattice as an operator: `K u` is the gradient of the energy. N and mm.
 pub struct Lattice<'a> {
     sites: &'a Sites,
     moduli: Moduli,
     pairs: Vec<Pair>,
+    scaled: Vec<kernel::Pair<f64>>,
     /// `w_i T θ_{s,i}` of the last application; empty at ν = ¼, where no volumetric pass is made.
     volumetric: Mutex<Vec<[f64; 2]>>,
 }
@@ -124,12 +66,15 @@ impl<'a> Lattice<'a> {
                 half: 0.5 / squared.sqrt(),
             }
         };
-        let pairs = stencil.pairs.iter().enumerate().map(pair).collect();
+        let pairs: Vec<Pair> = stencil.pairs.iter().enumerate().map(pair).collect();
+        let graded = sites.weights.is_some();
+        let scaled = pairs.iter().map(|p| p.scaled(graded)).collect();
         let scratch = if moduli.t == 0.0 { 0 } else { sites.len() };
         Lattice {
             sites,
             moduli,
             pairs,
+            scaled,
             volumetric: Mutex::new(vec![[0.0; 2]; scratch]),
         }
     }
@@ -155,52 +100,6 @@ impl<'a> Lattice<'a> {
             theta[pair.shell] += pair.half * along(pair.d, u[plus], u[minus]);
         }
         theta
-    }
-
-    /// `Σ_j ½ k n (n · (u_i − u_j))`: the springs' part of `K u` at one site.
-    fn spring_force(&self, u: &[[f64; 3]], site: usize) -> [f64; 3] {
-        let (here, mut f) = (u[site], [0.0; 3]);
-        match &self.sites.weights {
-            None => {
-                for (p, pair) in self.pairs.iter().enumerate() {
-                    let (plus, minus) = self.ends(site, p);
-                    let (a, b) = (u[plus], u[minus]);
-                    let stretch = pair.d[0] * (a[0] + b[0] - 2.0 * here[0])
-                        + pair.d[1] * (a[1] + b[1] - 2.0 * here[1])
-                        + pair.d[2] * (a[2] + b[2] - 2.0 * here[2]);
-                    pull(&mut f, pair.d, -pair.spring * stretch);
-                }
-            }
-            Some(w) => {
-                for (p, pair) in self.pairs.iter().enumerate() {
-                    let (plus, minus) = self.ends(site, p);
-                    let stretch = 0.5 * (w[site] + w[plus]) * along(pair.d, u[plus], here)
-                        + 0.5 * (w[site] + w[minus]) * along(pair.d, u[minus], here);
-                    pull(&mut f, pair.d, -pair.spring * stretch);
-                }
-            }
-        }
-        f
-    }
-
-    /// `−Σ_j ½ n (T θ_i + T θ_j)` over existing bonds.
-    fn volumetric_force(&self, t: &[[f64; 2]], site: usize, f: &mut [f64; 3]) {
-        let here = t[site];
-        for (p, pair) in self.pairs.iter().enumerate() {
-            let (plus, minus) = self.ends(site, p);
-            let s = pair.shell;
-            let ahead = if plus == site {
-                0.0
-            } else {
-                here[s] + t[plus][s]
-            };
-            let behind = if minus == site {
-                0.0
-            } else {
-                here[s] + t[minus][s]
-            };
-            pull(f, pair.d, -pair.half * (ahead - behind));
-        }
     }
 
     /// Elastic energy in N mm.
@@ -261,15 +160,145 @@ impl<'a> Lattice<'a> {
     }
 }
 
+impl Pair {
+    /// The pair as the kernels want it; on graded lattices with the half of `½ (w_i + w_j)`.
+    fn scaled(&self, graded: bool) -> kernel::Pair<f64> {
+        let d = self.d;
+        let c = -self.spring * if graded { 0.5 } else { 1.0 };
+        let cyclic = |turn: usize| {
+            let [x, y, z] = [0, 1, 2].map(|a| c * d[a] * d[(a + turn) % 3]);
+            [x, y, z, 0.0]
+        };
+        kernel::Pair {
+            shell: self.shell,
+            diagonals: [cyclic(0), cyclic(1), cyclic(2)],
+            axial: d.iter().filter(|&&c| c != 0.0).count() == 1,
+            lever: [self.half * d[0], self.half * d[1], self.half * d[2], 0.0],
+        }
+    }
+}
+
+/// The kernels on this processor.
+impl Lattice<'_> {
+    fn bonds(&self) -> Bonds<'_, f64> {
+        Bonds {
+            pairs: &self.scaled,
+            neighbours: &self.sites.neighbours,
+        }
+    }
+
+    /// The springs' part of `K u` at `sites`.
+    fn springs(&self, sites: Range<usize>, u: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        assert_eq!(u.len(), self.sites.len());
+        let weights = self.sites.weights.as_deref();
+        // SAFETY: `isa` vouches for the instruction set, `Sites` for neighbours below its length.
+        unsafe {
+            match isa() {
+                #[cfg(target_arch = "x86_64")]
+                Isa::Avx2 | Isa::Avx512 => avx2::springs(self.bonds(), weights, sites, u, y),
+                _ => springs::<quad::Plain64>(self.bonds(), weights, sites, u, y),
+            }
+        }
+    }
+
+    fn volumetric_pass(&self, sites: Range<usize>, u: &[[f64; 3]], theta: &mut [[f64; 2]]) {
+        assert_eq!(u.len(), self.sites.len());
+        // SAFETY: as `springs`.
+        unsafe {
+            match isa() {
+                #[cfg(target_arch = "x86_64")]
+                Isa::Avx2 | Isa::Avx512 => avx2::volumetric_sums(self.bonds(), sites, u, theta),
+                _ => kernel::volumetric_sums::<quad::Plain64>(self.bonds(), sites, u, theta),
+            }
+        }
+    }
+
+    fn add_volumetric_forces(&self, sites: Range<usize>, t: &[[f64; 2]], y: &mut [[f64; 3]]) {
+        assert_eq!(t.len(), self.sites.len());
+        // SAFETY: as `springs`.
+        unsafe {
+            match isa() {
+                #[cfg(target_arch = "x86_64")]
+                Isa::Avx2 | Isa::Avx512 => avx2::volumetric_forces(self.bonds(), sites, t, y),
+                _ => kernel::volumetric_forces::<quad::Plain64>(self.bonds(), sites, t, y),
+            }
+        }
+    }
+}
+
+/// Uniform or graded springs.
+///
+/// # Safety
+/// As [`kernel::springs`].
+#[inline(always)]
+unsafe fn springs<Q: quad::Quad>(
+    bonds: Bonds<Q::S>,
+    weights: Option<&[Q::S]>,
+    sites: Range<usize>,
+    u: &[[Q::S; 3]],
+    y: &mut [[Q::S; 3]],
+) {
+    unsafe {
+        match weights {
+            None => kernel::springs::<Q>(bonds, sites, u, y),
+            Some(w) => kernel::graded_springs::<Q>(bonds, w, sites, u, y),
+        }
+    }
+}
+
+/// The kernels compiled for AVX2 with fused multiply-add.
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use super::kernel::{self, Bonds};
+    use super::quad::{Avx32, Avx64};
+    use std::ops::Range;
+
+    #[target_feature(enable = "avx2,fma")]
+    pub unsafe fn springs(
+        bonds: Bonds<f64>,
+        weights: Option<&[f64]>,
+        sites: Range<usize>,
+        u: &[[f64; 3]],
+        y: &mut [[f64; 3]],
+    ) {
+        unsafe { super::springs::<Avx64>(bonds, weights, sites, u, y) }
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub unsafe fn springs_f32(
+        bonds: Bonds<f32>,
+        weights: Option<&[f32]>,
+        sites: Range<usize>,
+        u: &[[f32; 3]],
+        y: &mut [[f32; 3]],
+    ) {
+        unsafe { super::springs::<Avx32>(bonds, weights, sites, u, y) }
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub unsafe fn volumetric_sums(
+        bonds: Bonds<f64>,
+        sites: Range<usize>,
+        u: &[[f64; 3]],
+        theta: &mut [[f64; 2]],
+    ) {
+        unsafe { kernel::volumetric_sums::<Avx64>(bonds, sites, u, theta) }
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub unsafe fn volumetric_forces(
+        bonds: Bonds<f64>,
+        sites: Range<usize>,
+        t: &[[f64; 2]],
+        y: &mut [[f64; 3]],
+    ) {
+        unsafe { kernel::volumetric_forces::<Avx64>(bonds, sites, t, y) }
+    }
+}
+
 /// `d · (a − b)`.
 fn along(d: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
     d[0] * (a[0] - b[0]) + d[1] * (a[1] - b[1]) + d[2] * (a[2] - b[2])
-}
-
-fn pull(f: &mut [f64; 3], d: [f64; 3], amount: f64) {
-    for c in 0..3 {
-        f[c] += amount * d[c];
-    }
 }
 
 impl Operator<3> for Lattice<'_> {
@@ -278,36 +307,32 @@ impl Operator<3> for Lattice<'_> {
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        if self.moduli.t == 0.0 {
-            let springs = |(s, y): (usize, &mut [f64; 3])| *y = self.spring_force(x, s);
-            y.par_iter_mut()
-                .with_min_len(CHUNK / 4)
-                .enumerate()
-                .for_each(springs);
+        let t = self.moduli.t;
+        if t == 0.0 {
+            let springs = |(c, y): (usize, &mut [[f64; 3]])| self.springs(range(c, y.len()), x, y);
+            y.par_chunks_mut(PORTION).enumerate().for_each(springs);
             return;
         }
         let mut scratch = self
             .volumetric
             .lock()
             .expect("no application panics while it holds the scratch");
-        let t = self.moduli.t;
         scratch
-            .par_iter_mut()
-            .with_min_len(CHUNK / 4)
+            .par_chunks_mut(PORTION)
             .enumerate()
-            .for_each(|(s, out)| {
-                *out = self
-                    .volumetric_sums(x, s)
-                    .map(|theta| self.weight(s) * t * theta);
+            .for_each(|(c, theta)| {
+                let sites = range(c, theta.len());
+                self.volumetric_pass(sites.clone(), x, theta);
+                for (site, theta) in sites.zip(theta) {
+                    *theta = theta.map(|sum| self.weight(site) * t * sum);
+                }
             });
         let scratch = &*scratch;
-        y.par_iter_mut()
-            .with_min_len(CHUNK / 4)
-            .enumerate()
-            .for_each(|(s, y)| {
-                *y = self.spring_force(x, s);
-                self.volumetric_force(scratch, s, y);
-            });
+        y.par_chunks_mut(PORTION).enumerate().for_each(|(c, y)| {
+            let sites = range(c, y.len());
+            self.springs(sites.clone(), x, y);
+            self.add_volumetric_forces(sites, scratch, y);
+        });
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {

@@ -5,3 +5,4 @@ mod laws;
 mod layers;
 mod patch;
 mod segment;
+mod remodelling;

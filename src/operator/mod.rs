@@ -4,6 +4,7 @@
 
 pub mod coarsen;
 pub mod held;
+pub mod nonlinear;
 pub mod reduction;
 pub mod sparse;
 

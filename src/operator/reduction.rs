@@ -64,6 +64,11 @@ impl Reduction {
         self.free[q] as usize
     }
 
+    /// Number of unknowns whose equation belongs to a value before `value`; these come first.
+    pub fn unknowns_before(&self, value: usize) -> usize {
+        self.free.partition_point(|&v| (v as usize) < value)
+    }
+
     /// `x = T q + g`.
     pub fn expand(&self, q: &[f64], g: &[f64], x: &mut [f64]) {
         for i in 0..self.target.len() {

@@ -2,4 +2,6 @@
 
 pub mod anisotropic;
 pub mod hex8;
+pub mod bond_based;
+pub mod growth;
 pub mod lattice;

@@ -1,6 +1,8 @@
 //! Algorithms that see an operator, never the physics behind it.
 
 pub mod cg;
+pub mod chord;
 pub mod direct;
 pub mod estimate;
 pub mod jacobi;
+pub mod newton;

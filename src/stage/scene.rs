@@ -1,14 +1,21 @@
 //! Owns scenes: two-dimensional models of points joined by pair potentials (and their local twins), described in one
 //! file. Everything a scene leaves out costs nothing. This file holds the one match from the physics' words to code.
 
+mod body;
+pub mod bond_based;
 pub mod conditions;
+pub mod density;
 pub mod frame;
+mod march;
+pub mod solver;
 
 use crate::error::{Error, Result};
 use crate::topology::family::Stencil;
 use crate::topology::outline::{Bitmap, Outline};
 use crate::topology::plane::Points;
+use bond_based::BondBasedParams;
 use conditions::{Hold, Layers, Load, Time};
+use density::Probe;
 use frame::{Observer, Output, Summary};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -33,6 +40,9 @@ pub struct Scene {
     #[serde(default)]
     pub time: Option<Time>,
     pub physics: Physics,
+    /// Named regions whose numbers are followed.
+    #[serde(default)]
+    pub probe: Vec<Probe>,
     #[serde(default)]
     pub output: Output,
 }
@@ -59,7 +69,10 @@ pub struct GridParams {
 /// The physics of a scene: one table under `[physics]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Physics {}
+pub enum Physics {
+    /// Peridynamics with harmonic bonds, optionally growing.
+    BondBased(BondBasedParams),
+}
 
 /// What the scene's files hold, read by the caller.
 #[derive(Debug, Clone, Default)]
@@ -117,8 +130,9 @@ impl Scene {
 
 /// Runs a scene, reporting states to `observer` as they are accepted.
 pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Result<Summary> {
-    let _ = (inputs, observer);
-    match scene.physics {}
+    match &scene.physics {
+        Physics::BondBased(params) => bond_based::run(scene, params, inputs, observer),
+    }
 }
 
 /// The expected key closest to the unknown one that serde names in its message.

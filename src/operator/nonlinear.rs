@@ -1,0 +1,25 @@
+//! Owns the seam for nonlinear equations `R(q) = 0`: what a solver may know of a model during one time step.
+
+use crate::operator::sparse::Sparse;
+
+/// Equations with their exact tangent.
+pub trait Nonlinear: Sync {
+    /// `R(q)`.
+    fn residual(&self, q: &[f64], r: &mut [f64]);
+    /// `∂R/∂q`, into the pattern the model was given.
+    fn tangent(&self, q: &[f64], k: &mut Sparse);
+    /// Dimensionless size of a residual.
+    fn error(&self, r: &[f64]) -> f64;
+    /// The largest share of the update `dq` that keeps `q + share dq` admissible, at most 1.
+    fn share(&self, q: &[f64], dq: &[f64]) -> f64;
+}
+
+/// Equations whose first `local()` unknowns couple weakly: they can be updated one by one, and the others with a
+/// stiffness of their own.
+pub trait Staggered: Nonlinear {
+    fn local(&self) -> usize;
+    /// `∂R_i/∂q_i` of the local unknowns.
+    fn local_diagonal(&self, q: &[f64], d: &mut [f64]);
+    /// `−∂R/∂q` among the other unknowns; symmetric positive definite but for followers.
+    fn stiffness(&self, q: &[f64], k: &mut Sparse);
+}

@@ -1,0 +1,70 @@
+//! Owns Newton's method with an exact tangent and sparse LU, one time step at a time.
+
+use crate::error::Result;
+use crate::operator::nonlinear::Nonlinear;
+use crate::operator::sparse::Sparse;
+use crate::solve::direct::DirectLu;
+
+/// What is kept from step to step: the pattern and its symbolic factorisation.
+pub struct Newton {
+    tangent: Sparse,
+    lu: DirectLu,
+    pub tolerance: f64,
+    pub max_iterations: usize,
+}
+
+/// How the equations of a step were solved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Converged {
+    /// Error before each iteration, and after the last.
+    pub errors: Vec<f64>,
+}
+
+/// Why they were not.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotConverged {
+    /// Too many iterations, or a residual that is no number.
+    #[error("the iterations did not converge (residual {error:.1e})")]
+    Diverged { error: f64 },
+    #[error("the tangent is singular or not positive definite")]
+    Singular,
+}
+
+impl Newton {
+    pub fn new(pattern: Sparse, tolerance: f64, max_iterations: usize) -> Result<Self> {
+        Ok(Newton {
+            lu: DirectLu::new(&pattern)?,
+            tangent: pattern,
+            tolerance,
+            max_iterations,
+        })
+    }
+
+    /// Solves from the guess `q`, in place. One more iteration than the tolerance asks for is never done.
+    pub fn solve(
+        &mut self,
+        equations: &impl Nonlinear,
+        q: &mut [f64],
+    ) -> Result<Converged, NotConverged> {
+        let mut r = vec![0.0; q.len()];
+        let mut errors = Vec::new();
+        loop {
+            equations.residual(q, &mut r);
+            let error = equations.error(&r);
+            errors.push(error);
+            if error < self.tolerance {
+                return Ok(Converged { errors });
+            }
+            if errors.len() > self.max_iterations || !error.is_finite() {
+                return Err(NotConverged::Diverged { error });
+            }
+            equations.tangent(q, &mut self.tangent);
+            let factor = self.lu.factorize(&self.tangent);
+            factor.map_err(|_| NotConverged::Singular)?;
+            r.iter_mut().for_each(|v| *v = -*v);
+            self.lu.solve(&mut r);
+            let share = equations.share(q, &r);
+            q.iter_mut().zip(&r).for_each(|(q, dq)| *q += share * dq);
+        }
+    }
+}

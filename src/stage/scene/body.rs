@@ -1,0 +1,275 @@
+//! Owns the set-up that all displacement models of a scene share: which values are unknown, which follow, which are
+//! given at a time, and the guess a step starts from.
+
+use crate::error::{Error, Result};
+use crate::operator::reduction::{Reduction, Value};
+use crate::stage::scene::conditions::{Hold, Lateral, LayerDensity, Layers, Normal};
+use crate::topology::layers::{Fictitious, add_layers};
+use crate::topology::plane::Points;
+
+/// Points with their conditions. Values are densities first (point `p`), then placements (`points + 2p + axis`).
+pub struct Body {
+    /// Material points, then fictitious ones.
+    pub points: Points,
+    pub material: usize,
+    pub map: Reduction,
+    fictitious: Vec<Fictitious>,
+    layers: Option<Layers>,
+    /// Held placements: value, undeformed coordinate, index of the hold.
+    held: Vec<(usize, f64, usize)>,
+    holds: Vec<Hold>,
+    /// Initial density of every point.
+    density: Vec<f64>,
+}
+
+/// What a body is made from.
+pub struct Conditions<'a> {
+    pub layers: Option<&'a Layers>,
+    /// Rows of fictitious points where the scene does not say.
+    pub reach: usize,
+    pub holds: &'a [Hold],
+    /// Of the material points.
+    pub density: Vec<f64>,
+    pub reference_density: f64,
+    /// Whether densities are unknowns.
+    pub grows: bool,
+}
+
+impl Body {
+    pub fn new(material: Points, conditions: Conditions) -> Result<Self> {
+        let count = material.len();
+        let (points, fictitious) = match conditions.layers {
+            Some(layers) => {
+                check_layers(layers)?;
+                let depth = layers.depth.unwrap_or(conditions.reach);
+                add_layers(&material, &layers.edges, depth)?
+            }
+            None => (material, Vec::new()),
+        };
+        let mut density = conditions.density;
+        for f in &fictitious {
+            let fixed = conditions.layers.map(|l| l.density) == Some(LayerDensity::Fixed);
+            density.push(if fixed {
+                conditions.reference_density
+            } else {
+                density[f.mirrored]
+            });
+        }
+        let mut body = Body {
+            material: count,
+            map: Reduction::new(&[]),
+            fictitious,
+            layers: conditions.layers.cloned(),
+            held: Vec::new(),
+            holds: conditions.holds.to_vec(),
+            density,
+            points,
+        };
+        body.held = body.find_held()?;
+        body.map = Reduction::new(&body.roles(conditions.grows));
+        body.require_support()?;
+        Ok(body)
+    }
+
+    fn find_held(&self) -> Result<Vec<(usize, f64, usize)>> {
+        let mut held = Vec::new();
+        for (k, hold) in self.holds.iter().enumerate() {
+            let key = format!("hold[{k}].region");
+            hold.value.check(&format!("hold[{k}].value"))?;
+            let axis = axis_of(&hold.component, &format!("hold[{k}].component"))?;
+            for p in hold.region.select(&self.points, self.material, &key)? {
+                held.push((self.placement(p, axis), self.points.position(p)[axis], k));
+            }
+        }
+        Ok(held)
+    }
+
+    fn roles(&self, grows: bool) -> Vec<Value> {
+        let density = if grows { Value::Free } else { Value::Held };
+        let mut roles = vec![density; self.material];
+        roles.resize(self.points.len(), Value::Held);
+        roles.resize(self.points.len() + 2 * self.material, Value::Free);
+        roles.resize(3 * self.points.len(), Value::Held);
+        self.held
+            .iter()
+            .for_each(|&(value, _, _)| roles[value] = Value::Held);
+        let Some(layers) = &self.layers else {
+            return roles;
+        };
+        for (k, f) in self.fictitious.iter().enumerate() {
+            let p = self.material + k;
+            let (axis, _) = f.edge.normal();
+            if grows && layers.density == LayerDensity::Mirrored {
+                roles[p] = Value::Follows(f.mirrored);
+            }
+            let leader = self.placement(f.mirrored, 1 - axis);
+            // A held leader's own coordinate is the follower's too: both are given.
+            if layers.lateral == Lateral::Mirrored && roles[leader] == Value::Free {
+                roles[self.placement(p, 1 - axis)] = Value::Follows(leader);
+            }
+        }
+        roles
+    }
+
+    /// Place of a point's coordinate among the values.
+    pub fn placement(&self, point: usize, axis: usize) -> usize {
+        self.points.len() + 2 * point + axis
+    }
+
+    /// `g` at time `t`: held placements and densities; zero elsewhere.
+    pub fn given(&self, t: f64) -> Vec<f64> {
+        let mut given = vec![0.0; 3 * self.points.len()];
+        for p in 0..self.points.len() {
+            if self.map.unknown(p).is_none() {
+                given[p] = self.density[p];
+            }
+        }
+        for &(value, at_rest, k) in &self.held {
+            given[value] = at_rest + self.holds[k].value.at(t);
+        }
+        let Some(layers) = &self.layers else {
+            return given;
+        };
+        let u = layers.displacement.at(t);
+        for (k, f) in self.fictitious.iter().enumerate() {
+            let p = self.material + k;
+            let (axis, sign) = f.edge.normal();
+            let rest = self.points.position(p);
+            given[self.placement(p, axis)] = match layers.normal {
+                Normal::Affine => {
+                    let (centre, size) = self.extent(axis);
+                    centre + (rest[axis] - centre) * (1.0 + 2.0 * u / size)
+                }
+                Normal::Rigid => rest[axis] + sign as f64 * u,
+            };
+            let lateral = self.placement(p, 1 - axis);
+            if self.map.unknown(lateral).is_none() {
+                given[lateral] = rest[1 - axis];
+            }
+        }
+        given
+    }
+
+    /// Centre and size of the material along an axis.
+    fn extent(&self, axis: usize) -> (f64, f64) {
+        let cells = (0..self.material).map(|p| self.points.cell(p)[axis]);
+        let (low, high) = cells.fold((i32::MAX, i32::MIN), |(l, h), c| (l.min(c), h.max(c)));
+        let size = (high - low + 1) as f64 * self.points.spacing;
+        (
+            self.points.origin[axis] + low as f64 * self.points.spacing + 0.5 * size,
+            size,
+        )
+    }
+
+    /// Unknowns of the undeformed body.
+    pub fn start(&self) -> Vec<f64> {
+        let at_rest = |value: usize| match value.checked_sub(self.points.len()) {
+            None => self.density[value],
+            Some(place) => self.points.position(place / 2)[place % 2],
+        };
+        (0..self.map.unknowns())
+            .map(|q| at_rest(self.map.equation(q)))
+            .collect()
+    }
+
+    /// Carries placements over a change of the conditions between two times: the affine stretch that layers impose
+    /// (with lateral contraction by ν = 1/3), or the displacements scaled with proportional holds.
+    pub fn predict(&self, q: &mut [f64], before: f64, now: f64) {
+        if let Some(layers) = &self.layers {
+            let axis = layers.edges[0].normal().0;
+            let (u0, u1) = (layers.displacement.at(before), layers.displacement.at(now));
+            let size = self.extent(axis).1;
+            let along = (1.0 + 2.0 * u1 / size) / (1.0 + 2.0 * u0 / size);
+            let across = 1.0 - 2.0 / 3.0 * (u1 - u0) / size;
+            self.scale(
+                q,
+                |a, _| if a == axis { along } else { across },
+                |a| self.extent(a).0,
+            );
+        } else if let Some(ratio) = self.hold_ratio(before, now) {
+            self.stretch_displacements(q, ratio);
+        }
+    }
+
+    fn scale(
+        &self,
+        q: &mut [f64],
+        factor: impl Fn(usize, f64) -> f64,
+        centre: impl Fn(usize) -> f64,
+    ) {
+        for (k, q) in q.iter_mut().enumerate() {
+            if let Some(place) = self.map.equation(k).checked_sub(self.points.len()) {
+                let (axis, c) = (place % 2, centre(place % 2));
+                *q = c + (*q - c) * factor(axis, *q);
+            }
+        }
+    }
+
+    fn stretch_displacements(&self, q: &mut [f64], ratio: f64) {
+        for (k, q) in q.iter_mut().enumerate() {
+            if let Some(place) = self.map.equation(k).checked_sub(self.points.len()) {
+                let rest = self.points.position(place / 2)[place % 2];
+                *q = rest + (*q - rest) * ratio;
+            }
+        }
+    }
+
+    /// The factor all held displacements change by, if they share one.
+    fn hold_ratio(&self, before: f64, now: f64) -> Option<f64> {
+        let moving = self
+            .holds
+            .iter()
+            .map(|h| (h.value.at(before), h.value.at(now)));
+        let mut ratios = moving
+            .filter(|&(a, b)| a != 0.0 || b != 0.0)
+            .map(|(a, b)| b / a);
+        let first = ratios.next().filter(|r| r.is_finite())?;
+        ratios
+            .all(|r| (r - first).abs() < 1e-9 * first.abs())
+            .then_some(first)
+    }
+
+    /// Refuses a body that could move or turn as a whole.
+    fn require_support(&self) -> Result<()> {
+        let first = self.points.len();
+        let held = |axis: usize| {
+            (0..self.points.len()).any(|p| self.map.unknown(first + 2 * p + axis).is_none())
+        };
+        let missing = [0, 1].iter().find(|&&axis| !held(axis));
+        let count = (0..2 * first)
+            .filter(|v| self.map.unknown(first + v).is_none())
+            .count();
+        let found = match missing {
+            Some(axis) => format!("nothing holds the body along {}", ["x", "y"][*axis]),
+            None if count < 3 => {
+                "the body can turn: fewer than three displacements are held".to_owned()
+            }
+            None => return Ok(()),
+        };
+        Err(Error::specimen(
+            found,
+            "add a [[hold]] with a region and a component, for instance region = { point = [0, 0] }, component = \"x\"",
+        ))
+    }
+}
+
+fn check_layers(layers: &Layers) -> Result<()> {
+    layers.displacement.check("layers.displacement")?;
+    let axes: Vec<usize> = layers.edges.iter().map(|e| e.normal().0).collect();
+    if axes.is_empty() || axes.iter().any(|&a| a != axes[0]) {
+        return Err(Error::setting(
+            "layers.edges",
+            "expected one edge or two opposite edges",
+            "give [\"bottom\", \"top\"] or [\"left\", \"right\"]",
+        ));
+    }
+    Ok(())
+}
+
+/// 0 for "x", 1 for "y".
+pub fn axis_of(component: &str, key: &str) -> Result<usize> {
+    ["x", "y"]
+        .iter()
+        .position(|c| *c == component)
+        .ok_or_else(|| Error::setting(key, format!("found \"{component}\""), "give \"x\" or \"y\""))
+}

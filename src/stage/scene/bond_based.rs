@@ -1,0 +1,245 @@
+//! Owns scenes of bond-based peridynamics, with or without growth.
+
+use crate::error::{Error, Result};
+use crate::operator::nonlinear::Staggered;
+use crate::physics::bond_based::{BondBased, Step, micromodulus_continuous, micromodulus_discrete};
+use crate::physics::growth::Weight;
+use crate::solve::newton::NotConverged;
+use crate::stage::scene::body::{Body, Conditions};
+use crate::stage::scene::density::{DensityParams, GrowthParams, Probes};
+use crate::stage::scene::frame::{Field, Frame, Observer, Summary, Values};
+use crate::stage::scene::march::{Advance, Marching, march};
+use crate::stage::scene::solver::{Equilibrium, SolverParams};
+use crate::stage::scene::{Inputs, Scene};
+use crate::topology::family::Family;
+use serde::{Deserialize, Serialize};
+
+/// `[physics.bond-based]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BondBasedParams {
+    /// Young's modulus at the reference density. Poisson's ratio is 1/3 (plane stress).
+    pub young: f64,
+    #[serde(default)]
+    pub micromodulus: Micromodulus,
+    #[serde(default)]
+    pub density: DensityParams,
+    /// Absent: densities are no unknowns.
+    #[serde(default)]
+    pub growth: Option<GrowthParams>,
+    #[serde(default)]
+    pub solver: SolverParams,
+}
+
+/// Where the bond stiffness comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Micromodulus {
+    /// `6E / Σ L V` over the stencil: exact energy of small biaxial strain on this grid.
+    #[default]
+    Discrete,
+    /// `9E / (π δ³)`: the continuum's.
+    Continuous,
+    /// The continuum's, fitted at this finite biaxial strain `e` to St. Venant-Kirchhoff: `× (1 + e/2)²`.
+    Finite(f64),
+}
+
+/// Runs the scene.
+pub fn run(
+    scene: &Scene,
+    params: &BondBasedParams,
+    inputs: &Inputs,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    let mut model = Peridynamic::new(scene, params, inputs)?;
+    let Some(time) = &scene.time else {
+        return Err(Error::setting(
+            "time",
+            "missing",
+            "give [time] end and step",
+        ));
+    };
+    let mut summary = model.summary();
+    observer.start(
+        &scene.points(inputs)?,
+        (time.end / time.step).round() as usize,
+    )?;
+    march(&mut model, time, &scene.output, observer, &mut summary)?;
+    Ok(summary)
+}
+
+struct Peridynamic {
+    body: Body,
+    model: BondBased,
+    solver: Equilibrium,
+    probes: Probes,
+    reference: f64,
+    /// Unknowns now, and how far they moved in the step before (per unit of time).
+    q: Vec<f64>,
+    rate: Option<Vec<f64>>,
+    values: Vec<f64>,
+}
+
+impl Peridynamic {
+    fn new(scene: &Scene, params: &BondBasedParams, inputs: &Inputs) -> Result<Self> {
+        let stencil = scene.stencil()?;
+        let material = scene.points(inputs)?;
+        let growth = params
+            .growth
+            .as_ref()
+            .map(|g| g.checked(&params.density))
+            .transpose()?;
+        let probes = Probes::new(&scene.probe, &material)?;
+        let conditions = Conditions {
+            layers: scene.layers.as_ref(),
+            reach: stencil.reach() as usize,
+            holds: &scene.hold,
+            density: params.density.initial(&material, inputs)?,
+            reference_density: params.density.reference,
+            grows: growth.is_some(),
+        };
+        if !scene.load.is_empty() {
+            return Err(Error::setting(
+                "load",
+                "bond-based scenes are driven by displacements",
+                "obtain displacements from the same scene under [physics.continuum], and prescribe them with [[hold]]",
+            ));
+        }
+        let body = Body::new(material, conditions)?;
+        let micromodulus = params.micromodulus.value(params.young, &stencil)?;
+        let model = BondBased {
+            micromodulus,
+            young: params.young,
+            weight: Weight {
+                reference: params.density.reference,
+                exponent: params.density.exponent,
+            },
+            growth,
+            points: body.points.len(),
+            family: Family::new(&body.points, body.material, stencil),
+        };
+        let local = body.map.unknowns_before(body.points.len());
+        let positions = unknown_positions(&body, local);
+        let solver = Equilibrium::new(
+            &params.solver,
+            || model.pattern(&body.map),
+            || model.pattern_from(&body.map, local),
+            &positions,
+            model.family.stencil.horizon,
+        )?;
+        let q = body.start();
+        let mut values = vec![0.0; body.map.values()];
+        body.map.expand(&q, &body.given(0.0), &mut values);
+        Ok(Peridynamic {
+            body,
+            model,
+            solver,
+            probes,
+            reference: params.density.reference,
+            q,
+            rate: None,
+            values,
+        })
+    }
+
+    fn summary(&self) -> Summary {
+        Summary {
+            points: self.body.material,
+            unknowns: self.body.map.unknowns(),
+            bonds: self.model.family.len() / 2,
+            ..Summary::default()
+        }
+    }
+}
+
+/// Where each unknown from `first` on sits.
+pub fn unknown_positions(body: &Body, first: usize) -> Vec<[f64; 2]> {
+    let place = |q: usize| body.map.equation(q) - body.points.len();
+    (first..body.map.unknowns())
+        .map(|q| body.points.position(place(q) / 2))
+        .collect()
+}
+
+impl Marching for Peridynamic {
+    fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged> {
+        let given = self.body.given(now);
+        let step = Step {
+            model: &self.model,
+            map: &self.body.map,
+            given: &given,
+            old: &self.values[..self.body.material],
+            dt: now - before,
+        };
+        let mut q = self.q.clone();
+        self.body.predict(&mut q, before, now);
+        let advance = self
+            .solver
+            .solve(&step, &mut q, self.rate.as_deref(), now - before)?;
+        debug_assert_eq!(
+            step.local(),
+            self.body.map.unknowns_before(self.body.points.len())
+        );
+        self.rate = Some(
+            q.iter()
+                .zip(&self.q)
+                .map(|(new, old)| (new - old) / (now - before))
+                .collect(),
+        );
+        self.q = q;
+        self.body.map.expand(&self.q, &given, &mut self.values);
+        Ok(advance)
+    }
+
+    fn frame(&self, t: f64, with_fields: bool) -> Frame {
+        let material = self.body.material;
+        let relative = |rho: &f64| (rho - self.reference) / self.reference;
+        let change: Vec<f64> = self.values[..material].iter().map(relative).collect();
+        let mut fields = Vec::new();
+        let numbers = self.probes.numbers(&change);
+        if with_fields {
+            let energy = (0..material)
+                .map(|a| self.model.energy(&self.values, a))
+                .collect();
+            let moved = |p: usize| {
+                let rest = self.body.points.position(p);
+                [0, 1].map(|d| self.values[self.body.placement(p, d)] - rest[d])
+            };
+            fields.push(Field {
+                name: "density_change",
+                values: Values::Scalar(change),
+            });
+            fields.push(Field {
+                name: "energy_density",
+                values: Values::Scalar(energy),
+            });
+            fields.push(Field {
+                name: "displacement",
+                values: Values::Vector((0..material).map(moved).collect()),
+            });
+        }
+        Frame {
+            time: t,
+            numbers,
+            fields,
+        }
+    }
+}
+
+impl Micromodulus {
+    fn value(self, young: f64, stencil: &crate::topology::family::Stencil) -> Result<f64> {
+        if !(young.is_finite() && young > 0.0) {
+            return Err(Error::setting(
+                "physics.bond-based.young",
+                format!("found {young}"),
+                "give a positive modulus",
+            ));
+        }
+        Ok(match self {
+            Micromodulus::Discrete => micromodulus_discrete(young, stencil),
+            Micromodulus::Continuous => micromodulus_continuous(young, stencil),
+            Micromodulus::Finite(e) => {
+                micromodulus_continuous(young, stencil) * (1.0 + 0.5 * e).powi(2)
+            }
+        })
+    }
+}

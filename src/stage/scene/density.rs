@@ -1,0 +1,217 @@
+//! Owns density settings shared by the bond-based and the continuum model, and the numbers drawn from densities.
+
+use crate::error::{Error, Result};
+use crate::physics::growth::Growth;
+use crate::stage::scene::Inputs;
+use crate::stage::scene::conditions::Region;
+use crate::topology::plane::Points;
+use serde::{Deserialize, Serialize};
+
+/// Density at the start, and how stiffness follows it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DensityParams {
+    /// ρ*: the density at which `young` holds.
+    pub reference: f64,
+    /// Uniform density at the start; by default the reference.
+    pub initial: Option<f64>,
+    /// Density from the grey values of the geometry's file instead.
+    pub grey: Option<GreyParams>,
+    /// `n` of `(ρ/ρ*)^n`.
+    pub exponent: f64,
+    /// Uniform noise on the initial density, relative, drawn with `noise_seed`.
+    pub noise: f64,
+    pub noise_seed: u64,
+}
+
+impl Default for DensityParams {
+    fn default() -> Self {
+        DensityParams {
+            reference: 1.0,
+            initial: None,
+            grey: None,
+            exponent: 2.0,
+            noise: 0.0,
+            noise_seed: 1,
+        }
+    }
+}
+
+/// A straight line from grey values to density: `empty` is no density, `full` is the reference density.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GreyParams {
+    pub empty: f64,
+    pub full: f64,
+    /// Least relative density: cells of the mask are bone, however dark.
+    #[serde(default = "least")]
+    pub least: f64,
+}
+
+fn least() -> f64 {
+    0.05
+}
+
+/// The mass source `c [(ρ/ρ*)^−m Ψ − Ψ*]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GrowthParams {
+    pub rate: f64,
+    /// Attractor stimulus Ψ*.
+    pub stimulus: f64,
+    /// `m`; must exceed the density exponent `n`.
+    #[serde(default = "three")]
+    pub exponent: f64,
+}
+
+fn three() -> f64 {
+    3.0
+}
+
+impl GrowthParams {
+    /// The mass source, refused where it has no stable equilibrium.
+    pub fn checked(&self, density: &DensityParams) -> Result<Growth> {
+        let (n, m) = (density.exponent, self.exponent);
+        if n >= m || !m.is_finite() {
+            return Err(Error::setting(
+                "growth.exponent",
+                format!("n = {n} is not below m = {m}"),
+                "take m > n (the paper has n = 2, m = 3): with n >= m stiffening raises the stimulus faster than growth \
+                 lowers it, so densities drift or run away instead of settling",
+            ));
+        }
+        let positive = [
+            ("growth.rate", self.rate),
+            ("growth.stimulus", self.stimulus),
+        ];
+        for (key, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::setting(
+                    key,
+                    format!("found {value}"),
+                    "give a positive number",
+                ));
+            }
+        }
+        Ok(Growth {
+            reference: density.reference,
+            rate: self.rate,
+            stimulus: self.stimulus,
+            exponent: m,
+        })
+    }
+}
+
+impl DensityParams {
+    /// Density of each material point at the start.
+    pub fn initial(&self, points: &Points, inputs: &Inputs) -> Result<Vec<f64>> {
+        self.check()?;
+        let uniform = self.initial.unwrap_or(self.reference);
+        let mut density = match &self.grey {
+            None => vec![uniform; points.len()],
+            Some(grey) => self.from_grey(grey, points, inputs)?,
+        };
+        if self.noise > 0.0 {
+            use rand::{Rng, SeedableRng};
+            let mut random = rand_pcg::Pcg64::seed_from_u64(self.noise_seed);
+            for rho in &mut density {
+                let unit = random.next_u64() as f64 / u64::MAX as f64;
+                *rho *= 1.0 + self.noise * (2.0 * unit - 1.0);
+            }
+        }
+        Ok(density)
+    }
+
+    fn check(&self) -> Result<()> {
+        let uniform = self.initial.unwrap_or(self.reference);
+        let positive = [
+            ("density.reference", self.reference),
+            ("density.initial", uniform),
+        ];
+        for (key, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::setting(
+                    key,
+                    format!("found {value}"),
+                    "a density must be positive",
+                ));
+            }
+        }
+        if !(0.0..1.0).contains(&self.noise) || !self.exponent.is_finite() {
+            return Err(Error::setting(
+                "density.noise",
+                format!("found noise {} and exponent {}", self.noise, self.exponent),
+                "noise is relative, from 0 to below 1: a density must stay positive",
+            ));
+        }
+        Ok(())
+    }
+
+    fn from_grey(&self, grey: &GreyParams, points: &Points, inputs: &Inputs) -> Result<Vec<f64>> {
+        let (Some(values), Some(bitmap)) = (&inputs.grey, &inputs.bitmap) else {
+            return Err(Error::setting(
+                "density.grey",
+                "this geometry has no grey values",
+                "take a slice of a scan (geometry.slice with grey), or an image",
+            ));
+        };
+        if grey.full == grey.empty || !(grey.least > 0.0) {
+            return Err(Error::setting(
+                "density.grey",
+                "empty and full are equal, or least is not positive",
+                "correct them",
+            ));
+        }
+        let at = |p: usize| {
+            let [i, j] = points.cell(p);
+            let value = values[j as usize * bitmap.n[0] + i as usize];
+            self.reference * ((value - grey.empty) / (grey.full - grey.empty)).max(grey.least)
+        };
+        Ok((0..points.len()).map(at).collect())
+    }
+}
+
+/// A named region whose densities are followed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    pub name: String,
+    pub region: Region,
+}
+
+/// The whole body and the probes' points.
+pub struct Probes(Vec<(String, Vec<usize>)>);
+
+impl Probes {
+    pub fn new(probes: &[Probe], points: &Points) -> Result<Self> {
+        let mut all = vec![(String::new(), (0..points.len()).collect())];
+        for (k, probe) in probes.iter().enumerate() {
+            let chosen =
+                probe
+                    .region
+                    .select(points, points.len(), &format!("probe[{k}].region"))?;
+            all.push((format!("{}.", probe.name), chosen));
+        }
+        Ok(Probes(all))
+    }
+
+    /// Mean, 5 % and 95 % quantiles, least and largest of `values` over each region.
+    pub fn numbers(&self, values: &[f64]) -> Vec<(String, f64)> {
+        let mut numbers = Vec::new();
+        for (name, region) in &self.0 {
+            let mut sorted: Vec<f64> = region.iter().map(|&p| values[p]).collect();
+            let mean = sorted.iter().sum::<f64>() / sorted.len() as f64;
+            sorted.sort_unstable_by(f64::total_cmp);
+            let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
+            let row = [
+                ("mean", mean),
+                ("p05", at(0.05)),
+                ("p95", at(0.95)),
+                ("min", at(0.0)),
+                ("max", at(1.0)),
+            ];
+            numbers.extend(row.map(|(what, v)| (format!("{name}{what}"), v)));
+        }
+        numbers
+    }
+}

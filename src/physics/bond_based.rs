@@ -23,6 +23,8 @@ pub struct BondBased {
     pub young: f64,
     pub weight: Weight,
     pub growth: Option<Growth>,
+    /// Share of each point's cell that belongs to the body, where not all are whole.
+    pub shares: Option<Vec<f64>>,
     /// Points in all, fictitious ones included.
     pub points: usize,
 }
@@ -67,7 +69,8 @@ impl BondBased {
         let xi = [x(i, 0) - x(a, 0), x(i, 1) - x(a, 1)];
         let length = (xi[0] * xi[0] + xi[1] * xi[1]).sqrt();
         let (w, dw) = self.weight.at(0.5 * (values[a] + values[i]));
-        let volume = bond.share * self.family.stencil.spacing * self.family.stencil.spacing;
+        let share = self.shares.as_ref().map_or(1.0, |s| s[i]);
+        let volume = share * bond.share * self.family.stencil.spacing.powi(2);
         let strain = length / bond.length - 1.0;
         Pair {
             xi,

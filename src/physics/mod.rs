@@ -3,5 +3,7 @@
 pub mod anisotropic;
 pub mod hex8;
 pub mod bond_based;
+pub mod continuum;
 pub mod growth;
+pub mod hyperelastic;
 pub mod lattice;

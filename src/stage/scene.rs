@@ -4,6 +4,7 @@
 mod body;
 pub mod bond_based;
 pub mod conditions;
+pub mod continuum;
 pub mod density;
 pub mod frame;
 mod march;
@@ -15,6 +16,7 @@ use crate::topology::outline::{Bitmap, Outline};
 use crate::topology::plane::Points;
 use bond_based::BondBasedParams;
 use conditions::{Hold, Layers, Load, Time};
+use continuum::ContinuumParams;
 use density::Probe;
 use frame::{Observer, Output, Summary};
 use serde::{Deserialize, Serialize};
@@ -64,6 +66,9 @@ pub struct GridParams {
     /// Drop all but the largest connected piece.
     #[serde(default)]
     pub keep_largest: bool,
+    /// Drop points that belong to no square of four neighbouring points, which finite elements need.
+    #[serde(default)]
+    pub prune: bool,
 }
 
 /// The physics of a scene: one table under `[physics]`.
@@ -72,6 +77,8 @@ pub struct GridParams {
 pub enum Physics {
     /// Peridynamics with harmonic bonds, optionally growing.
     BondBased(BondBasedParams),
+    /// Its local twin by finite elements.
+    Continuum(ContinuumParams),
 }
 
 /// What the scene's files hold, read by the caller.
@@ -100,6 +107,11 @@ impl Scene {
         let points = self
             .geometry
             .points(self.grid.spacing, inputs.bitmap.as_ref())?;
+        let points = if self.grid.prune {
+            points.pruned()
+        } else {
+            points
+        };
         let points = if self.grid.keep_largest {
             points.largest_piece()
         } else {
@@ -132,6 +144,7 @@ impl Scene {
 pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Result<Summary> {
     match &scene.physics {
         Physics::BondBased(params) => bond_based::run(scene, params, inputs, observer),
+        Physics::Continuum(params) => continuum::run(scene, params, inputs, observer),
     }
 }
 

@@ -33,7 +33,7 @@ pub struct Fictitious {
 }
 
 /// `material` followed by `depth` rows of fictitious points beyond each of `edges`. The edge is that of the bounding
-/// box; the fictitious points mirror the material points nearest to it.
+/// box, or its outermost row where the points lie on it; the fictitious points mirror the material points nearest to it.
 pub fn add_layers(
     material: &Points,
     edges: &[Edge],
@@ -44,7 +44,7 @@ pub fn add_layers(
     let mut fictitious = Vec::new();
     for &edge in edges {
         let (axis, sign) = edge.normal();
-        if depth > n[axis] {
+        if depth + usize::from(material.on_edges) > n[axis] {
             return Err(Error::specimen(
                 format!(
                     "a fictitious layer of {depth} rows cannot mirror {} rows of points",
@@ -53,23 +53,21 @@ pub fn add_layers(
                 "refine grid.spacing, shorten grid.horizon or enlarge the geometry",
             ));
         }
-        let face = low[axis] + if sign > 0 { n[axis] as i32 } else { 0 };
+        let face = low[axis] + if sign > 0 { n[axis] as i32 - 1 } else { 0 };
+        // Rows count from 0 at the edge inwards; a row on the edge itself mirrors nothing.
+        let on_edge = i32::from(material.on_edges);
         for i in 0..material.len() {
             let mut cell = material.cell(i);
-            let mirrored = 2 * face - 1 - cell[axis];
-            let beyond = if sign > 0 {
-                mirrored - face
-            } else {
-                face - 1 - mirrored
-            };
-            if beyond < depth as i32 {
-                cell[axis] = mirrored;
+            let row = sign * (face - cell[axis]);
+            if (on_edge..on_edge + depth as i32).contains(&row) {
+                cell[axis] = face + sign * (row + 1 - on_edge);
                 cells.push(cell);
                 fictitious.push(Fictitious { mirrored: i, edge });
             }
         }
     }
-    let points = Points::from_cells(material.origin, material.spacing, cells);
+    let mut points = Points::from_cells(material.origin, material.spacing, cells);
+    points.on_edges = material.on_edges;
     Ok((points, fictitious))
 }
 

@@ -123,12 +123,10 @@ impl Rectangle {
         let shift = if self.nodal { 0.5 * spacing } else { 0.0 };
         let more = usize::from(self.nodal);
         let origin = n.map(|cells| -0.5 * cells as f64 * spacing - shift);
-        Ok(Points::from_box(
-            origin,
-            spacing,
-            n.map(|cells| cells + more),
-            |_| true,
-        ))
+        let n = n.map(|cells| cells + more);
+        let mut points = Points::from_box(origin, spacing, n, |_| true);
+        points.on_edges = self.nodal;
+        Ok(points)
     }
 }
 

@@ -12,6 +12,8 @@ pub struct Points {
     pub spacing: f64,
     /// Lower left corner of cell `[0, 0]`.
     pub origin: [f64; 2],
+    /// Whether the outermost points lie on the edges of the body instead of half a spacing inside.
+    pub on_edges: bool,
     cells: Vec<[i32; 2]>,
     low: [i32; 2],
     n: [usize; 2],
@@ -48,6 +50,7 @@ impl Points {
         let mut points = Points {
             spacing,
             origin,
+            on_edges: false,
             cells,
             low,
             n,
@@ -163,6 +166,20 @@ impl Points {
         let keep = (0..count).rev().max_by_key(|&p| sizes[p]).unwrap_or(0) as u32;
         let kept = self.cells.iter().zip(&piece).filter(|(_, p)| **p == keep);
         Points::from_cells(self.origin, self.spacing, kept.map(|(c, _)| *c).collect())
+    }
+
+    /// Only the points that belong to a square of four neighbouring points.
+    pub fn pruned(&self) -> Points {
+        let there = |[i, j]: [i32; 2], [a, b]: [i32; 2]| self.at([i + a, j + b]).is_some();
+        let square = |c: [i32; 2], [a, b]: [i32; 2]| {
+            there(c, [a, 0]) && there(c, [0, b]) && there(c, [a, b])
+        };
+        let corners = [[1, 1], [-1, 1], [-1, -1], [1, -1]];
+        let kept = self
+            .cells
+            .iter()
+            .filter(|c| corners.iter().any(|&d| square(**c, d)));
+        Points::from_cells(self.origin, self.spacing, kept.copied().collect())
     }
 
     fn slot(&self, cell: [i32; 2]) -> Option<usize> {

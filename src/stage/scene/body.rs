@@ -4,7 +4,7 @@
 use crate::error::{Error, Result};
 use crate::operator::reduction::{Reduction, Value};
 use crate::stage::scene::conditions::{Hold, Lateral, LayerDensity, Layers, Normal};
-use crate::topology::layers::{Fictitious, add_layers};
+use crate::topology::layers::{Edge, Fictitious, add_layers};
 use crate::topology::plane::Points;
 
 /// Points with their conditions. Values are densities first (point `p`), then placements (`points + 2p + axis`).
@@ -17,6 +17,8 @@ pub struct Body {
     layers: Option<Layers>,
     /// Held placements: value, undeformed coordinate, index of the hold.
     held: Vec<(usize, f64, usize)>,
+    /// Material points on a loaded edge itself: they move with it.
+    on_edge: Vec<(usize, Edge)>,
     holds: Vec<Hold>,
     /// Initial density of every point.
     density: Vec<f64>,
@@ -38,6 +40,7 @@ pub struct Conditions<'a> {
 impl Body {
     pub fn new(material: Points, conditions: Conditions) -> Result<Self> {
         let count = material.len();
+        let on_edges = material.on_edges;
         let (points, fictitious) = match conditions.layers {
             Some(layers) => {
                 check_layers(layers)?;
@@ -61,11 +64,13 @@ impl Body {
             fictitious,
             layers: conditions.layers.cloned(),
             held: Vec::new(),
+            on_edge: Vec::new(),
             holds: conditions.holds.to_vec(),
             density,
             points,
         };
         body.held = body.find_held()?;
+        body.on_edge = body.edge_rows(on_edges);
         body.map = Reduction::new(&body.roles(conditions.grows));
         body.require_support()?;
         Ok(body)
@@ -84,6 +89,22 @@ impl Body {
         Ok(held)
     }
 
+    fn edge_rows(&self, on_edges: bool) -> Vec<(usize, Edge)> {
+        let Some(layers) = self.layers.as_ref().filter(|_| on_edges) else {
+            return Vec::new();
+        };
+        let mut rows = Vec::new();
+        for &edge in &layers.edges {
+            let (axis, sign) = edge.normal();
+            let outermost = (0..self.material)
+                .map(|p| sign * self.points.cell(p)[axis])
+                .max();
+            let on = |p: &usize| Some(sign * self.points.cell(*p)[axis]) == outermost;
+            rows.extend((0..self.material).filter(on).map(|p| (p, edge)));
+        }
+        rows
+    }
+
     fn roles(&self, grows: bool) -> Vec<Value> {
         let density = if grows { Value::Free } else { Value::Held };
         let mut roles = vec![density; self.material];
@@ -96,6 +117,9 @@ impl Body {
         let Some(layers) = &self.layers else {
             return roles;
         };
+        for &(p, edge) in &self.on_edge {
+            roles[self.placement(p, edge.normal().0)] = Value::Held;
+        }
         for (k, f) in self.fictitious.iter().enumerate() {
             let p = self.material + k;
             let (axis, _) = f.edge.normal();
@@ -131,6 +155,10 @@ impl Body {
             return given;
         };
         let u = layers.displacement.at(t);
+        for &(p, edge) in &self.on_edge {
+            let (axis, sign) = edge.normal();
+            given[self.placement(p, axis)] = self.points.position(p)[axis] + sign as f64 * u;
+        }
         for (k, f) in self.fictitious.iter().enumerate() {
             let p = self.material + k;
             let (axis, sign) = f.edge.normal();
@@ -154,11 +182,54 @@ impl Body {
     fn extent(&self, axis: usize) -> (f64, f64) {
         let cells = (0..self.material).map(|p| self.points.cell(p)[axis]);
         let (low, high) = cells.fold((i32::MAX, i32::MIN), |(l, h), c| (l.min(c), h.max(c)));
-        let size = (high - low + 1) as f64 * self.points.spacing;
+        let rim = if self.on_edge.is_empty() { 1 } else { 0 };
+        let size = (high - low + rim) as f64 * self.points.spacing;
+        let low = low as f64 + 0.5 * (1 - rim) as f64;
         (
-            self.points.origin[axis] + low as f64 * self.points.spacing + 0.5 * size,
+            self.points.origin[axis] + low * self.points.spacing + 0.5 * size,
             size,
         )
+    }
+
+    /// Share of each point's cell inside the body: points on a free edge have half a cell (a quarter at corners). None
+    /// where all cells are whole.
+    pub fn shares(&self) -> Option<Vec<f64>> {
+        if !self.points.on_edges {
+            return None;
+        }
+        let layered = self.layers.as_ref().map(|l| l.edges[0].normal().0);
+        let cells = || (0..self.material).map(|p| self.points.cell(p));
+        let mut share = vec![1.0; self.material];
+        for axis in [0, 1].into_iter().filter(|a| Some(*a) != layered) {
+            let low = cells().map(|c| c[axis]).min();
+            let high = cells().map(|c| c[axis]).max();
+            for (share, cell) in share.iter_mut().zip(cells()) {
+                if Some(cell[axis]) == low || Some(cell[axis]) == high {
+                    *share *= 0.5;
+                }
+            }
+        }
+        share.extend(
+            self.fictitious
+                .iter()
+                .map(|f| share[f.mirrored])
+                .collect::<Vec<_>>(),
+        );
+        Some(share)
+    }
+
+    /// Where each unknown from `first` on, a placement, sits at rest.
+    pub fn unknown_positions(&self, first: usize) -> Vec<[f64; 2]> {
+        let place = |q: usize| self.map.equation(q) - self.points.len();
+        (first..self.map.unknowns())
+            .map(|q| self.points.position(place(q) / 2))
+            .collect()
+    }
+
+    /// Displacement of a point.
+    pub fn displacement(&self, values: &[f64], point: usize) -> [f64; 2] {
+        let rest = self.points.position(point);
+        [0, 1].map(|d| values[self.placement(point, d)] - rest[d])
     }
 
     /// Unknowns of the undeformed body.

@@ -1,13 +1,12 @@
 //! Owns scenes of bond-based peridynamics, with or without growth.
 
 use crate::error::{Error, Result};
-use crate::operator::nonlinear::Staggered;
 use crate::physics::bond_based::{BondBased, Step, micromodulus_continuous, micromodulus_discrete};
 use crate::physics::growth::Weight;
 use crate::solve::newton::NotConverged;
 use crate::stage::scene::body::{Body, Conditions};
 use crate::stage::scene::density::{DensityParams, GrowthParams, Probes};
-use crate::stage::scene::frame::{Field, Frame, Observer, Summary, Values};
+use crate::stage::scene::frame::{Frame, Observer, Summary};
 use crate::stage::scene::march::{Advance, Marching, march};
 use crate::stage::scene::solver::{Equilibrium, SolverParams};
 use crate::stage::scene::{Inputs, Scene};
@@ -89,7 +88,6 @@ impl Peridynamic {
             .as_ref()
             .map(|g| g.checked(&params.density))
             .transpose()?;
-        let probes = Probes::new(&scene.probe, &material)?;
         let conditions = Conditions {
             layers: scene.layers.as_ref(),
             reach: stencil.reach() as usize,
@@ -105,7 +103,14 @@ impl Peridynamic {
                 "obtain displacements from the same scene under [physics.continuum], and prescribe them with [[hold]]",
             ));
         }
-        let body = Body::new(material, conditions)?;
+        let body = Body::new(material.clone(), conditions)?;
+        let shares = body.shares();
+        let probes = match &shares {
+            Some(shares) => {
+                Probes::weighted(&scene.probe, &material, shares[..body.material].to_vec())?
+            }
+            None => Probes::new(&scene.probe, &material)?,
+        };
         let micromodulus = params.micromodulus.value(params.young, &stencil)?;
         let model = BondBased {
             micromodulus,
@@ -115,11 +120,12 @@ impl Peridynamic {
                 exponent: params.density.exponent,
             },
             growth,
+            shares,
             points: body.points.len(),
             family: Family::new(&body.points, body.material, stencil),
         };
         let local = body.map.unknowns_before(body.points.len());
-        let positions = unknown_positions(&body, local);
+        let positions = body.unknown_positions(local);
         let solver = Equilibrium::new(
             &params.solver,
             || model.pattern(&body.map),
@@ -152,14 +158,6 @@ impl Peridynamic {
     }
 }
 
-/// Where each unknown from `first` on sits.
-pub fn unknown_positions(body: &Body, first: usize) -> Vec<[f64; 2]> {
-    let place = |q: usize| body.map.equation(q) - body.points.len();
-    (first..body.map.unknowns())
-        .map(|q| body.points.position(place(q) / 2))
-        .collect()
-}
-
 impl Marching for Peridynamic {
     fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged> {
         let given = self.body.given(now);
@@ -175,10 +173,6 @@ impl Marching for Peridynamic {
         let advance = self
             .solver
             .solve(&step, &mut q, self.rate.as_deref(), now - before)?;
-        debug_assert_eq!(
-            step.local(),
-            self.body.map.unknowns_before(self.body.points.len())
-        );
         self.rate = Some(
             q.iter()
                 .zip(&self.q)
@@ -191,37 +185,13 @@ impl Marching for Peridynamic {
     }
 
     fn frame(&self, t: f64, with_fields: bool) -> Frame {
-        let material = self.body.material;
         let relative = |rho: &f64| (rho - self.reference) / self.reference;
-        let change: Vec<f64> = self.values[..material].iter().map(relative).collect();
-        let mut fields = Vec::new();
-        let numbers = self.probes.numbers(&change);
-        if with_fields {
-            let energy = (0..material)
-                .map(|a| self.model.energy(&self.values, a))
-                .collect();
-            let moved = |p: usize| {
-                let rest = self.body.points.position(p);
-                [0, 1].map(|d| self.values[self.body.placement(p, d)] - rest[d])
-            };
-            fields.push(Field {
-                name: "density_change",
-                values: Values::Scalar(change),
-            });
-            fields.push(Field {
-                name: "energy_density",
-                values: Values::Scalar(energy),
-            });
-            fields.push(Field {
-                name: "displacement",
-                values: Values::Vector((0..material).map(moved).collect()),
-            });
-        }
-        Frame {
-            time: t,
-            numbers,
-            fields,
-        }
+        let change = self.values[..self.body.material]
+            .iter()
+            .map(relative)
+            .collect();
+        self.probes
+            .frame(t, &self.body, &self.values, change, with_fields)
     }
 }
 

@@ -3,7 +3,9 @@
 use crate::error::{Error, Result};
 use crate::physics::growth::Growth;
 use crate::stage::scene::Inputs;
+use crate::stage::scene::body::Body;
 use crate::stage::scene::conditions::Region;
+use crate::stage::scene::frame::{Field, Frame, Values};
 use crate::topology::plane::Points;
 use serde::{Deserialize, Serialize};
 
@@ -180,38 +182,90 @@ pub struct Probe {
 }
 
 /// The whole body and the probes' points.
-pub struct Probes(Vec<(String, Vec<usize>)>);
+pub struct Probes {
+    regions: Vec<(String, Vec<usize>)>,
+    /// Area each point stands for; only ratios matter.
+    area: Vec<f64>,
+}
 
 impl Probes {
+    /// All points weigh alike.
     pub fn new(probes: &[Probe], points: &Points) -> Result<Self> {
-        let mut all = vec![(String::new(), (0..points.len()).collect())];
-        for (k, probe) in probes.iter().enumerate() {
-            let chosen =
-                probe
-                    .region
-                    .select(points, points.len(), &format!("probe[{k}].region"))?;
-            all.push((format!("{}.", probe.name), chosen));
-        }
-        Ok(Probes(all))
+        Probes::weighted(probes, points, vec![1.0; points.len()])
     }
 
-    /// Mean, 5 % and 95 % quantiles, least and largest of `values` over each region.
-    pub fn numbers(&self, values: &[f64]) -> Vec<(String, f64)> {
-        let mut numbers = Vec::new();
-        for (name, region) in &self.0 {
-            let mut sorted: Vec<f64> = region.iter().map(|&p| values[p]).collect();
-            let mean = sorted.iter().sum::<f64>() / sorted.len() as f64;
-            sorted.sort_unstable_by(f64::total_cmp);
-            let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
-            let row = [
-                ("mean", mean),
-                ("p05", at(0.05)),
-                ("p95", at(0.95)),
-                ("min", at(0.0)),
-                ("max", at(1.0)),
-            ];
-            numbers.extend(row.map(|(what, v)| (format!("{name}{what}"), v)));
+    pub fn weighted(probes: &[Probe], points: &Points, area: Vec<f64>) -> Result<Self> {
+        let mut regions = vec![(String::new(), (0..points.len()).collect())];
+        for (k, probe) in probes.iter().enumerate() {
+            let key = format!("probe[{k}].region");
+            let chosen = probe.region.select(points, points.len(), &key)?;
+            regions.push((format!("{}.", probe.name), chosen));
         }
-        numbers
+        Ok(Probes { regions, area })
+    }
+
+    /// Mean, 5 % and 95 % quantiles, least and largest density change over each region, and each probe's mean
+    /// displacement; with the fields themselves where they are due.
+    pub fn frame(
+        &self,
+        t: f64,
+        body: &Body,
+        values: &[f64],
+        change: Vec<f64>,
+        with_fields: bool,
+    ) -> Frame {
+        let mut numbers = Vec::new();
+        for (name, region) in &self.regions {
+            let row = self.summary(region, &change);
+            numbers.extend(row.map(|(what, v)| (format!("{name}{what}"), v)));
+            if !name.is_empty() {
+                let mean = |d: usize| {
+                    let sum: f64 = region
+                        .iter()
+                        .map(|&p| body.displacement(values, p)[d])
+                        .sum();
+                    sum / region.len() as f64
+                };
+                numbers.push((format!("{name}ux"), mean(0)));
+                numbers.push((format!("{name}uy"), mean(1)));
+            }
+        }
+        let mut fields = Vec::new();
+        if with_fields {
+            let moved = (0..body.material).map(|p| body.displacement(values, p));
+            let moved = Values::Vector(moved.collect());
+            fields.push(Field {
+                name: "density_change",
+                values: Values::Scalar(change),
+            });
+            fields.push(Field {
+                name: "displacement",
+                values: moved,
+            });
+        }
+        Frame {
+            time: t,
+            numbers,
+            fields,
+        }
+    }
+
+    fn summary(&self, region: &[usize], values: &[f64]) -> [(&'static str, f64); 5] {
+        let area: f64 = region.iter().map(|&p| self.area[p]).sum();
+        let mean = region
+            .iter()
+            .map(|&p| self.area[p] * values[p])
+            .sum::<f64>()
+            / area;
+        let mut sorted: Vec<f64> = region.iter().map(|&p| values[p]).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
+        [
+            ("mean", mean),
+            ("p05", at(0.05)),
+            ("p95", at(0.95)),
+            ("min", at(0.0)),
+            ("max", at(1.0)),
+        ]
     }
 }

@@ -4,5 +4,5 @@ mod cli;
 mod laws;
 mod layers;
 mod patch;
-mod segment;
 mod remodelling;
+mod segment;

@@ -297,11 +297,13 @@ impl Step<'_> {
                 let old = self.old_at(e, &p.n);
                 let b = growth.balance(p.density, old, p.weight * p.energy, self.dt);
                 let by = b.by_density + b.by_energy * p.by_density * p.energy;
-                for a in 0..4 {
-                    let test = dv * p.n[a];
-                    (0..4).for_each(|c| k[a][c] += test * by * p.n[c]);
-                    (0..8).for_each(|q| k[a][4 + q] += test * b.by_energy * p.weight * force[q]);
-                    (0..8).for_each(|q| k[4 + q][a] -= dv * p.by_density * force[q] * p.n[a]);
+                let by_place = b.by_energy * p.weight;
+                for (row, n) in k.iter_mut().zip(p.n) {
+                    (0..4).for_each(|c| row[c] += dv * n * by * p.n[c]);
+                    (0..8).for_each(|q| row[4 + q] += dv * n * by_place * force[q]);
+                }
+                for (row, force) in k[4..].iter_mut().zip(force) {
+                    (0..4).for_each(|a| row[a] -= dv * p.by_density * force * p.n[a]);
                 }
             }
         }

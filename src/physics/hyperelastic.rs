@@ -87,8 +87,8 @@ fn bonds(directions: &[([f64; 2], f64)], f: &Plane) -> Response {
         let stretch = t[0].hypot(t[1]);
         let pull = 2.0 * a * (1.0 - 1.0 / stretch);
         sum.energy += a * (stretch - 1.0).powi(2);
-        for i in 0..2 {
-            (0..2).for_each(|j| sum.stress[i][j] += pull * t[i] * n[j]);
+        for (i, row) in sum.stress.iter_mut().enumerate() {
+            (0..2).for_each(|j| row[j] += pull * t[i] * n[j]);
         }
         let along = 2.0 * a / stretch.powi(3);
         for (i, j, k, l) in indices() {

@@ -1,9 +1,9 @@
 //! Energies and the forces that follow from them. No physics imports another, or a solver.
 
 pub mod anisotropic;
-pub mod hex8;
 pub mod bond_based;
 pub mod continuum;
 pub mod growth;
+pub mod hex8;
 pub mod hyperelastic;
 pub mod lattice;

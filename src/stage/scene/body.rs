@@ -143,9 +143,9 @@ impl Body {
     /// `g` at time `t`: held placements and densities; zero elsewhere.
     pub fn given(&self, t: f64) -> Vec<f64> {
         let mut given = vec![0.0; 3 * self.points.len()];
-        for p in 0..self.points.len() {
+        for (p, (given, density)) in given.iter_mut().zip(&self.density).enumerate() {
             if self.map.unknown(p).is_none() {
-                given[p] = self.density[p];
+                *given = *density;
             }
         }
         for &(value, at_rest, k) in &self.held {

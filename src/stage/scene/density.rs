@@ -111,7 +111,7 @@ impl DensityParams {
         let uniform = self.initial.unwrap_or(self.reference);
         let mut density = match &self.grey {
             None => vec![uniform; points.len()],
-            Some(grey) => self.from_grey(grey, points, inputs)?,
+            Some(grey) => self.grey_densities(grey, points, inputs)?,
         };
         if self.noise > 0.0 {
             use rand::{Rng, SeedableRng};
@@ -149,7 +149,12 @@ impl DensityParams {
         Ok(())
     }
 
-    fn from_grey(&self, grey: &GreyParams, points: &Points, inputs: &Inputs) -> Result<Vec<f64>> {
+    fn grey_densities(
+        &self,
+        grey: &GreyParams,
+        points: &Points,
+        inputs: &Inputs,
+    ) -> Result<Vec<f64>> {
         let (Some(values), Some(bitmap)) = (&inputs.grey, &inputs.bitmap) else {
             return Err(Error::setting(
                 "density.grey",
@@ -157,7 +162,7 @@ impl DensityParams {
                 "take a slice of a scan (geometry.slice with grey), or an image",
             ));
         };
-        if grey.full == grey.empty || !(grey.least > 0.0) {
+        if grey.full == grey.empty || grey.least.is_nan() || grey.least <= 0.0 {
             return Err(Error::setting(
                 "density.grey",
                 "empty and full are equal, or least is not positive",

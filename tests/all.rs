@@ -5,4 +5,5 @@ mod laws;
 mod layers;
 mod patch;
 mod remodelling;
+mod phantom;
 mod segment;

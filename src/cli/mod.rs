@@ -94,7 +94,7 @@ pub fn run() -> Result<Outcome> {
         Verb::Solve(args) => solve::run(args, &session, json),
         Verb::Report(args) => report::run(args, &session, json),
         Verb::Run(args) => run::run(args, &session, json),
-        Verb::Phantom(args) => phantom::run(args, &session),
+        Verb::Phantom(args) => phantom::run(args, &session, json),
         Verb::Info(args) => info::run(args, json),
         Verb::Scene(args) => scene::run(args, &session),
         Verb::Completions(args) => completions::run(args),

@@ -187,7 +187,10 @@ mod tests {
             }
         }
         let diagonal = [new[0][0], new[1][1], new[2][2]];
-        assert!(diagonal.iter().all(|&d| d > 0.0), "canonical axes point the world's way");
+        assert!(
+            diagonal.iter().all(|&d| d > 0.0),
+            "canonical axes point the world's way"
+        );
         assert!(notes[0].contains("x = -k, y = +i, z = -j"), "{notes:?}");
     }
 

@@ -82,7 +82,8 @@ pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
     })
 }
 
-fn stored(path: &Path) -> Result<Stored> {
+/// What a file or folder holds, axes as stored.
+pub fn stored(path: &Path) -> Result<Stored> {
     let meta = std::fs::metadata(path).map_err(|e| {
         Error::file(
             path,

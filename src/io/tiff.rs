@@ -4,11 +4,13 @@ use crate::error::{Error, Result};
 use crate::io::raw::{self, Layout, Scalar};
 use crate::io::scan::Stored;
 use crate::io::slices::{self, Slice};
+use crate::volume::Volume;
 use std::fs::File;
 use std::io::{BufReader, Seek, SeekFrom};
 use std::path::Path;
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::encoder::{Compression, DeflateLevel, Rational, TiffEncoder, colortype};
 use tiff::tags::Tag;
 
 const DAMAGED: &str =
@@ -251,6 +253,43 @@ fn rare_stack(path: &Path, images: usize) -> Error {
     )
 }
 
+/// Writes a folder of 16-bit signed slices that carry their pixel size; voxels must be as high as wide.
+pub fn write_slices(folder: &Path, name: &str, volume: &Volume<i16>) -> Result<()> {
+    let [nx, ny, nz] = volume.grid.n;
+    // Pixels per centimetre, in units that hold µm exactly.
+    let per_cm = volume.grid.spacing_mm.map(|s| Rational {
+        n: 10_000_000,
+        d: (s * 1e6).round() as u32,
+    });
+    let digits = nz.to_string().len().max(4);
+    for (k, slice) in volume.as_slice().chunks_exact(nx * ny).enumerate() {
+        let path = folder.join(format!("{name}_{k:0digits$}.tif"));
+        let encode = |bytes: &mut std::io::Cursor<Vec<u8>>| -> tiff::TiffResult<()> {
+            let mut encoder =
+                TiffEncoder::new(bytes)?.with_compression(Compression::Deflate(DeflateLevel::Best));
+            let mut image = encoder.new_image::<colortype::GrayI16>(nx as u32, ny as u32)?;
+            image
+                .encoder()
+                .write_tag(Tag::XResolution, per_cm[0].clone())?;
+            image
+                .encoder()
+                .write_tag(Tag::YResolution, per_cm[1].clone())?;
+            image.encoder().write_tag(Tag::ResolutionUnit, 3u16)?;
+            image.write_data(slice)
+        };
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        encode(&mut bytes).map_err(|e| {
+            Error::file(
+                &path,
+                format!("cannot be encoded as TIFF ({e})"),
+                "choose another format",
+            )
+        })?;
+        crate::io::atomic::write(&path, bytes.into_inner())?;
+    }
+    Ok(())
+}
+
 /// What ImageJ notes in the first page's description.
 #[derive(Debug, Default, PartialEq)]
 struct ImageJ {
@@ -337,7 +376,9 @@ fn resolution(d: &mut Decoder<BufReader<File>>) -> (Option<[f64; 2]>, Option<f64
         3 if x > 50.0 => 10.0,
         _ => return (None, None),
     };
-    (Some([unit / x, unit / y]), None)
+    // Rational tags carry rounding: whole nanometres.
+    let pixel = |per_unit: f64| (unit / per_unit * 1e6).round() / 1e6;
+    (Some([pixel(x), pixel(y)]), None)
 }
 
 /// Dots per inch that image programs write when nobody told them a size.
@@ -379,7 +420,6 @@ fn ome(xml: &str) -> (Option<[f64; 2]>, Option<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tiff::encoder::{Rational, TiffEncoder, colortype};
 
     fn write_stack(path: &Path, text: &str, pages: usize, resolution: u32) {
         let mut encoder = TiffEncoder::new(File::create(path).unwrap()).unwrap();
@@ -465,6 +505,30 @@ mod tests {
         assert_eq!(s.n, [3, 2, 3]);
         assert_eq!(s.values[5], 5.0);
         assert_eq!(s.values[6 + 5], f32::from(u16::from_le_bytes([6, 1])));
+    }
+
+    #[test]
+    fn written_slices_come_back_as_a_scan_with_its_size() {
+        let dir = tempfile::tempdir().unwrap();
+        let grid = crate::grid::Grid::new([5, 4, 3], [0.0195; 3]);
+        let volume = Volume::from_vec(grid, (0..60).map(|v| v * 100 - 3000).collect());
+        write_slices(dir.path(), "s", &volume).unwrap();
+        let back = slices::read(dir.path()).unwrap();
+        assert_eq!(back.n, grid.n);
+        assert!(
+            back.spacing_mm
+                .unwrap()
+                .iter()
+                .all(|s| (s - 0.0195).abs() < 1e-9),
+            "{:?}",
+            back.spacing_mm
+        );
+        assert!(
+            back.values
+                .iter()
+                .zip(volume.as_slice())
+                .all(|(&a, &b)| a == f32::from(b))
+        );
     }
 
     #[test]

@@ -11,9 +11,8 @@ use std::ops::Range;
 /// Half of a normalised, symmetric kernel: `[w0, w1, …, wR]` with `R = ⌊4σ + ½⌋`, `σ` in voxels.
 pub fn kernel(sigma: f64) -> Vec<f64> {
     let radius = (4.0 * sigma + 0.5).floor() as usize;
-    let raw: Vec<f64> = (0..=radius)
-        .map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp())
-        .collect();
+    let weight = |i: usize| exp_minus(0.5 * (i as f64 / sigma) * (i as f64 / sigma));
+    let raw: Vec<f64> = (0..=radius).map(weight).collect();
     let sum = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
     raw.into_iter().map(|w| w / sum).collect()
 }

@@ -1,17 +1,135 @@
 //! Owns `info`: what is known of a scan, without segmenting it.
 
 use crate::error::Result;
-use crate::run::not_available;
+use crate::io::scan;
 use serde::Serialize;
 use std::path::Path;
 
-/// What a scan's header says.
+/// What a scan's file says, and what its grey values are.
 #[derive(Debug, Clone, Serialize)]
 pub struct ScanInfo {
+    pub scan: String,
+    pub format: String,
+    pub voxels: [usize; 3],
+    /// None where the file does not say.
+    pub spacing_mm: Option<[f64; 3]>,
+    pub size_mm: Option<[f64; 3]>,
+    /// Unit of the grey values where known.
+    pub unit: Option<String>,
+    pub grey_min: Option<f32>,
+    pub grey_max: Option<f32>,
+    pub grey_mean: Option<f64>,
+    /// Grey values below which 1, 25, 50, 75 and 99 % of the voxels lie.
+    pub grey_percentiles: Vec<f32>,
+    pub non_finite_voxels: u64,
+    pub blake3: String,
+    /// Further facts of the format. Names of persons are left out.
+    pub details: Vec<(String, String)>,
+    pub notes: Vec<String>,
     /// One line per fact, for people.
+    #[serde(skip)]
     pub lines: Vec<String>,
 }
 
-pub fn info(_file: &Path) -> Result<ScanInfo> {
-    Err(not_available("info"))
+pub fn info(file: &Path) -> Result<ScanInfo> {
+    let stored = scan::stored(file)?;
+    let mut sorted: Vec<f32> = stored
+        .values
+        .iter()
+        .copied()
+        .filter(|v| v.is_finite())
+        .collect();
+    let non_finite = (stored.values.len() - sorted.len()) as u64;
+    let mean = sorted.iter().map(|&v| f64::from(v)).sum::<f64>() / sorted.len().max(1) as f64;
+    sorted.sort_unstable_by(f32::total_cmp);
+    let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
+    let some = !sorted.is_empty();
+    let size = stored
+        .spacing_mm
+        .map(|s| std::array::from_fn(|a| s[a] * stored.n[a] as f64));
+    let mut info = ScanInfo {
+        scan: scan::name(file),
+        format: stored.format,
+        voxels: stored.n,
+        spacing_mm: stored.spacing_mm,
+        size_mm: size,
+        unit: stored.unit,
+        grey_min: some.then(|| at(0.0)),
+        grey_max: some.then(|| at(1.0)),
+        grey_mean: some.then_some(mean),
+        grey_percentiles: if some {
+            [0.01, 0.25, 0.5, 0.75, 0.99].map(at).to_vec()
+        } else {
+            Vec::new()
+        },
+        non_finite_voxels: non_finite,
+        blake3: scan::hash(file)?,
+        details: stored.details,
+        notes: stored.notes,
+        lines: Vec::new(),
+    };
+    if let Some(turn) = stored.affine.as_ref().and_then(crate::io::orient::Turn::of) {
+        let words = if turn.is_identity() {
+            "canonical (x right, y front, z up)".into()
+        } else {
+            turn.words()
+        };
+        info.details.push(("orientation".into(), words));
+    }
+    info.lines = lines(&info);
+    Ok(info)
+}
+
+fn lines(info: &ScanInfo) -> Vec<String> {
+    let triple = |v: [f64; 3]| format!("{} × {} × {}", short(v[0]), short(v[1]), short(v[2]));
+    let [nx, ny, nz] = info.voxels;
+    let mut lines = vec![
+        format!("scan         {}", info.scan),
+        format!("format       {}", info.format),
+        format!("voxels       {nx} × {ny} × {nz}"),
+        match info.spacing_mm {
+            Some(s) => format!("voxel size   {} mm", triple(s)),
+            None => "voxel size   not in the file: give --spacing".into(),
+        },
+    ];
+    lines.extend(
+        info.size_mm
+            .map(|s| format!("size         {} mm", triple(s))),
+    );
+    let unit = info.unit.as_deref().unwrap_or("unit not in the file");
+    if let (Some(min), Some(max), Some(mean)) = (info.grey_min, info.grey_max, info.grey_mean) {
+        lines.push(format!(
+            "grey values  {min} to {max}, mean {} ({unit})",
+            short(mean)
+        ));
+        let p = &info.grey_percentiles;
+        lines.push(format!(
+            "percentiles  1 %: {}, 25 %: {}, 50 %: {}, 75 %: {}, 99 %: {}",
+            p[0], p[1], p[2], p[3], p[4]
+        ));
+    }
+    if info.non_finite_voxels > 0 {
+        lines.push(format!(
+            "not finite   {} voxels (taken as pore)",
+            info.non_finite_voxels
+        ));
+    }
+    lines.push(format!("blake3       {}", info.blake3));
+    lines.extend(
+        info.details
+            .iter()
+            .map(|(key, value)| format!("{key:<12} {value}")),
+    );
+    lines.extend(info.notes.iter().map(|note| format!("note         {note}")));
+    lines
+}
+
+/// Six significant digits, none in vain.
+fn short(v: f64) -> f64 {
+    if v == 0.0 || !v.is_finite() {
+        return v;
+    }
+    let digits = 5 - v.abs().log10().floor() as i32;
+    let scale = 10f64.powi(digits);
+    (v * scale).round() / scale
 }

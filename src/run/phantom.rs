@@ -1,21 +1,68 @@
 //! Owns `phantom` on disk: a synthetic scan as an image file, or as a folder of TIFF slices.
 
-use crate::error::Result;
-use crate::run::not_available;
+use crate::error::{Error, Result};
+use crate::io::{atomic, nifti, scan, tiff};
 use crate::run::session::Session;
+use crate::stage::phantom::{self as stage, PhantomParams, PhantomSummary};
 use std::path::Path;
 
-/// What a phantom is made from.
-#[derive(Debug, Clone)]
-pub struct PhantomParams {
-    pub size_mm: [f64; 3],
-    pub spacing_mm: f64,
-    /// Bone volume over total volume, between 0 and 1.
-    pub bvtv: f64,
-    pub seed: u64,
+/// Writes the scan to `out` (`.nii`, `.nii.gz`, or else a folder of TIFF slices), and the clean mask to `mask`.
+pub fn phantom(
+    out: &Path,
+    mask: Option<&Path>,
+    params: &PhantomParams,
+    session: &Session,
+) -> Result<PhantomSummary> {
+    params.check()?;
+    let as_nifti = is_nifti(out);
+    if !as_nifti && !session.force && std::fs::read_dir(out).is_ok_and(|mut d| d.next().is_some()) {
+        return Err(Error::file(
+            out,
+            "is a folder that is not empty",
+            "choose another folder, or --force to write slices into this one",
+        ));
+    }
+    if let Some(mask) = mask.filter(|m| !is_nifti(m)) {
+        return Err(Error::file(
+            mask,
+            "a mask is written as NIfTI",
+            "give a name that ends in .nii.gz",
+        ));
+    }
+    let mut phantom = stage::structure(params)?;
+    let scan = stage::scan(&mut phantom, params);
+    say(&phantom.summary, session);
+    if session.dry_run {
+        return Ok(phantom.summary);
+    }
+    if let Some(path) = mask {
+        nifti::write(path, &phantom.mask)?;
+    }
+    drop(phantom.mask);
+    if as_nifti {
+        nifti::write(out, &scan)?;
+    } else {
+        atomic::create_dir(out)?;
+        tiff::write_slices(out, &scan::name(out), &scan)?;
+    }
+    Ok(phantom.summary)
 }
 
-/// Writes the phantom to `file`.
-pub fn phantom(_file: &Path, _params: &PhantomParams, _session: &Session) -> Result<()> {
-    Err(not_available("phantom"))
+fn is_nifti(path: &Path) -> bool {
+    let name = path.to_string_lossy().to_lowercase();
+    name.ends_with(".nii") || name.ends_with(".nii.gz")
+}
+
+fn say(s: &PhantomSummary, session: &Session) {
+    let [nx, ny, nz] = s.voxels;
+    session.say(format!(
+        "{nx} × {ny} × {nz} voxels, BV/TV {:.4}, {} specks of debris, plate thickness {} mm",
+        s.bv_tv,
+        s.debris,
+        s.plate_thickness_mm
+            .map_or("NA".into(), |t| format!("{t:.3}")),
+    ));
+    if !s.connects_z {
+        session.warn("no path of bone connects the two faces along z");
+    }
 }

@@ -8,18 +8,33 @@ use crate::volume::Volume;
 pub fn scan(phantom: &mut Phantom, params: &PhantomParams) -> Volume<i16> {
     let grid = phantom.mask.grid;
     let [dark, contrast] = [params.background_hu, params.bone_hu - params.background_hu];
-    let mut bone = Volume::from_vec(grid, phantom.mask.as_slice().iter().map(|&v| f32::from(v)).collect());
+    let mut bone = Volume::from_vec(
+        grid,
+        phantom
+            .mask
+            .as_slice()
+            .iter()
+            .map(|&v| f32::from(v))
+            .collect(),
+    );
     phantom.summary.debris = add_debris(&mut bone, &phantom.mask, params);
     let noise = Numbers::new(params.seed, 3);
     let plane = grid.n[0] * grid.n[1];
-    let slabs = gaussian::map_slabs(&bone, params.blur_voxels, |v| v, |slices, values| {
-        let first = (slices.start * plane) as u64;
-        let grey = |(at, &v): (usize, &f32)| {
-            let hu = dark + contrast * f64::from(v) + params.noise_hu * noise.normal(first + at as u64);
-            hu.round() as i16
-        };
-        values.iter().enumerate().map(grey).collect::<Vec<i16>>()
-    });
+    let slabs = gaussian::map_slabs(
+        &bone,
+        params.blur_voxels,
+        |v| v,
+        |slices, values| {
+            let first = (slices.start * plane) as u64;
+            let grey = |(at, &v): (usize, &f32)| {
+                let hu = dark
+                    + contrast * f64::from(v)
+                    + params.noise_hu * noise.normal(first + at as u64);
+                hu.round() as i16
+            };
+            values.iter().enumerate().map(grey).collect::<Vec<i16>>()
+        },
+    );
     Volume::from_vec(grid, slabs.concat())
 }
 
@@ -47,7 +62,9 @@ fn add_debris(bone: &mut Volume<f32>, mask: &Volume<u8>, params: &PhantomParams)
             z.flat_map(move |k| y.clone().map(move |j| (k, j)))
                 .flat_map(move |(k, j)| x.clone().map(move |i| [i, j, k]))
                 .filter(move |p| {
-                    let d2: f64 = (0..3).map(|a| (p[a] as f64 + 0.5 - center[a]) * (p[a] as f64 + 0.5 - center[a])).sum();
+                    let d2: f64 = (0..3)
+                        .map(|a| (p[a] as f64 + 0.5 - center[a]) * (p[a] as f64 + 0.5 - center[a]))
+                        .sum();
                     d2 <= reach
                 })
         };
@@ -77,12 +94,28 @@ mod tests {
         let mut phantom = structure(&params).unwrap();
         let scan = super::scan(&mut phantom, &params);
         assert!(phantom.summary.debris > 20, "{:?}", phantom.summary);
-        let scan = crate::volume::Volume::from_vec(scan.grid, scan.as_slice().iter().map(|&v| f32::from(v)).collect());
-        let window = SegmentParams { lower: Some(200.0), upper: Some(5600.0), ..Default::default() };
+        let scan = crate::volume::Volume::from_vec(
+            scan.grid,
+            scan.as_slice().iter().map(|&v| f32::from(v)).collect(),
+        );
+        let window = SegmentParams {
+            lower: Some(200.0),
+            upper: Some(5600.0),
+            ..Default::default()
+        };
         let s = segment("p", &scan, &window, None).unwrap();
-        assert!(s.summary.components > phantom.summary.debris / 2, "{:?}", s.summary);
+        assert!(
+            s.summary.components > phantom.summary.debris / 2,
+            "{:?}",
+            s.summary
+        );
         let both = |a: u8, b: u8| u64::from(a == 1 && b == 1);
-        let pairs = s.specimen.bone.as_slice().iter().zip(phantom.mask.as_slice());
+        let pairs = s
+            .specimen
+            .bone
+            .as_slice()
+            .iter()
+            .zip(phantom.mask.as_slice());
         let shared: u64 = pairs.map(|(&a, &b)| both(a, b)).sum();
         let truth = (phantom.summary.bv_tv * scan.grid.len() as f64).round() as u64;
         let dice = 2.0 * shared as f64 / (truth + s.summary.bone_voxels) as f64;

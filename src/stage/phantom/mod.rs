@@ -11,6 +11,7 @@ use crate::measure::thickness::plate_thickness_mm;
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 use shape::Shape;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What a phantom is made from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -64,35 +65,92 @@ impl PhantomParams {
     /// Share of the plates cut away as holes. The default makes sparse bone of rods and dense bone of plates, as bone is:
     /// 0.41 at BV/TV 0.1, 0.32 at 0.2, 0.14 at 0.4.
     pub fn perforation(&self) -> f64 {
-        self.perforation.unwrap_or((0.5 - 0.9 * self.bvtv).max(0.05))
+        self.perforation
+            .unwrap_or((0.5 - 0.9 * self.bvtv).max(0.05))
+    }
+
+    /// The thickness at which pores between the plates have this mean width: `T = Sp · φ / (1 − φ)` with the plates'
+    /// share `φ` before holes are cut (parallel plates, Parfitt 1983).
+    pub fn thickness_for_separation(&self, separation_mm: f64) -> f64 {
+        let plates = self.bvtv / (1.0 - self.perforation());
+        separation_mm * plates / (1.0 - plates).max(0.05)
     }
 
     /// Refuses what cannot be made.
     pub fn check(&self) -> Result<()> {
-        let range = |key: &str, v: f64, low: f64, high: f64, advice: &str| match v >= low && v <= high {
-            true => Ok(()),
-            false => Err(Error::setting(key, format!("{v} is not between {low} and {high}"), advice)),
-        };
+        let range =
+            |key: &str, v: f64, low: f64, high: f64, advice: &str| match v >= low && v <= high {
+                true => Ok(()),
+                false => Err(Error::setting(
+                    key,
+                    format!("{v} is not between {low} and {high}"),
+                    advice,
+                )),
+            };
         range("bvtv", self.bvtv, 0.02, 0.7, "bone has 0.05 to 0.4")?;
-        range("spacing-mm", self.spacing_mm, 1e-4, 10.0, "give the voxel size in mm")?;
+        range(
+            "spacing-mm",
+            self.spacing_mm,
+            1e-4,
+            10.0,
+            "give the voxel size in mm",
+        )?;
         for size in self.size_mm {
-            range("size-mm", size, self.spacing_mm, 1e4, "give edge lengths in mm")?;
+            range(
+                "size-mm",
+                size,
+                self.spacing_mm,
+                1e4,
+                "give edge lengths in mm",
+            )?;
         }
         let shortest = self.size_mm.iter().copied().fold(f64::INFINITY, f64::min);
-        range("thickness-mm", self.thickness_mm, self.spacing_mm, shortest, "trabeculae are 0.05 to 0.3 mm thick")?;
-        range("anisotropy", self.anisotropy, 0.2, 5.0, "1 is isotropic; human bone has 1.2 to 2")?;
-        range("perforation", self.perforation(), 0.0, 0.6, "plates fall apart above about 0.5")?;
+        range(
+            "thickness-mm",
+            self.thickness_mm,
+            self.spacing_mm,
+            shortest,
+            "trabeculae are 0.05 to 0.3 mm thick",
+        )?;
+        range(
+            "anisotropy",
+            self.anisotropy,
+            0.2,
+            5.0,
+            "1 is isotropic; human bone has 1.2 to 2",
+        )?;
+        range(
+            "perforation",
+            self.perforation(),
+            0.0,
+            0.6,
+            "plates fall apart above about 0.5",
+        )?;
         range("noise-hu", self.noise_hu, 0.0, 5000.0, "100 is usual")?;
         range("blur", self.blur_voxels, 0.0, 5.0, "0.5 to 1 is usual")?;
-        range("debris", self.debris_per_mm3, 0.0, 100.0, "give specks per mm³")?;
-        range("gap-mm", self.gap_mm, 0.0, self.size_mm[2], "a gap is part of the height")?;
+        range(
+            "debris",
+            self.debris_per_mm3,
+            0.0,
+            100.0,
+            "give specks per mm³",
+        )?;
+        range(
+            "gap-mm",
+            self.gap_mm,
+            0.0,
+            self.size_mm[2],
+            "a gap is part of the height",
+        )?;
         let voxels: f64 = self.size_mm.iter().map(|l| l / self.spacing_mm).product();
         range("size-mm", voxels, 1.0, 8e9, "fewer or larger voxels")
     }
 
     /// As many whole voxels as come nearest to the size.
     pub fn grid(&self) -> Grid {
-        let n = self.size_mm.map(|l| ((l / self.spacing_mm).round() as usize).max(1));
+        let n = self
+            .size_mm
+            .map(|l| ((l / self.spacing_mm).round() as usize).max(1));
         Grid::new(n, [self.spacing_mm; 3])
     }
 }
@@ -123,25 +181,37 @@ pub struct Phantom {
 pub fn structure(params: &PhantomParams) -> Result<Phantom> {
     params.check()?;
     let grid = params.grid();
-    let shape = Shape::new(params, params.thickness_mm);
-    let mut mask = Volume::from_vec(grid, carve(&shape, &grid, params.bvtv));
-    let bone = count(&mask);
-    cut_gap(&mut mask, params.gap_mm);
-    let components = Components::of(&mask);
-    let Some(largest) = components.largest() else {
-        return Err(Error::specimen("the phantom has no bone", "make it larger, or choose another seed"));
-    };
-    // A gap leaves two halves, and both belong.
-    if params.gap_mm == 0.0 {
-        components.keep_only(largest, &mut mask);
+    let shape = Shape::new(params);
+    let counts = hole_levels(&shape, &grid);
+    let wanted = (params.bvtv * grid.len() as f64).round() as u64;
+    let mut asked = wanted;
+    let mut closest: Option<(Volume<u8>, u64, u64)> = None;
+    // What islands take away is asked for in addition: smaller holes, which joins islands too.
+    for _ in 0..5 {
+        let (mask, kept, removed) = carve(&shape, &grid, level_for(&counts, asked), params)?;
+        let miss = wanted.abs_diff(kept);
+        if closest
+            .as_ref()
+            .is_none_or(|(_, k, _)| miss < wanted.abs_diff(*k))
+        {
+            closest = Some((mask, kept, removed));
+        }
+        if miss * 1000 <= wanted || params.gap_mm > 0.0 {
+            break;
+        }
+        asked = (asked + wanted).saturating_sub(kept);
     }
-    let kept = count(&mask);
+    let (mask, kept, removed) = closest.expect("at least one was carved");
     let summary = PhantomSummary {
         voxels: grid.n,
         bv_tv: kept as f64 / grid.len() as f64,
         plate_thickness_mm: plate_thickness_mm(&mask),
-        removed_voxels: if params.gap_mm == 0.0 { bone - kept } else { 0 },
-        connects_z: Components::of(&mask).spanning_z(&mask).into_iter().next().is_some(),
+        removed_voxels: removed,
+        connects_z: Components::of(&mask)
+            .spanning_z(&mask)
+            .into_iter()
+            .next()
+            .is_some(),
         debris: 0,
     };
     Ok(Phantom { mask, summary })
@@ -155,27 +225,57 @@ pub fn scan(phantom: &mut Phantom, params: &PhantomParams) -> Volume<i16> {
 /// Bins between -5 and 5 standard deviations of the hole field; a bin is 1e-4 of a phantom's bone.
 const BINS: usize = 1 << 16;
 
-/// Chooses the level of the holes that leaves `bvtv`, then applies it; slices are made twice, never held.
-fn carve(shape: &Shape, grid: &Grid, bvtv: f64) -> Vec<u8> {
-    let bin = |level: f32| (((level + 5.0) * (BINS as f32 / 10.0)) as usize).min(BINS - 1);
-    let counted = shape.slices(grid, |_, levels| {
-        let mut bins: Vec<u32> = levels.iter().filter(|l| l.is_finite()).map(|&l| bin(l) as u32).collect();
-        bins.sort_unstable();
-        bins
+fn bin(level: f32) -> usize {
+    (((level + 5.0) * (BINS as f32 / 10.0)) as usize).min(BINS - 1)
+}
+
+/// How many voxels become bone at each level of the holes.
+fn hole_levels(shape: &Shape, grid: &Grid) -> Vec<u64> {
+    let counts: Vec<AtomicU64> = (0..BINS).map(|_| AtomicU64::new(0)).collect();
+    shape.slices(grid, |_, levels| {
+        for &level in levels.iter().filter(|l| l.is_finite()) {
+            counts[bin(level)].fetch_add(1, Ordering::Relaxed);
+        }
     });
-    let mut counts = vec![0u64; BINS];
-    counted.into_iter().flatten().for_each(|b| counts[b as usize] += 1);
-    let wanted = (bvtv * grid.len() as f64).round() as u64;
+    counts.into_iter().map(AtomicU64::into_inner).collect()
+}
+
+/// The last bin that is bone when `voxels` are.
+fn level_for(counts: &[u64], voxels: u64) -> usize {
     let mut below = 0;
-    let last = counts.iter().position(|c| {
+    let reached = counts.iter().position(|c| {
         below += c;
-        below >= wanted
+        below >= voxels
     });
-    let last = last.unwrap_or(BINS - 1);
+    reached.unwrap_or(BINS - 1)
+}
+
+/// Bone up to a level of the holes, its largest piece kept; slices are made anew, never held. Returns bone voxels kept
+/// and removed. A gap leaves two halves, and both belong.
+fn carve(
+    shape: &Shape,
+    grid: &Grid,
+    last: usize,
+    params: &PhantomParams,
+) -> Result<(Volume<u8>, u64, u64)> {
+    let bone = |&l: &f32| u8::from(l.is_finite() && bin(l) <= last);
     let slices = shape.slices(grid, |_, levels| {
-        levels.iter().map(|&l| u8::from(l.is_finite() && bin(l) <= last)).collect::<Vec<u8>>()
+        levels.iter().map(bone).collect::<Vec<u8>>()
     });
-    slices.concat()
+    let mut mask = Volume::from_vec(*grid, slices.concat());
+    let all = count(&mask);
+    let components = Components::of(&mask);
+    let Some(largest) = components.largest() else {
+        return Err(Error::specimen(
+            "the phantom has no bone",
+            "make it larger, or choose another seed",
+        ));
+    };
+    components.keep_only(largest, &mut mask);
+    let kept = count(&mask);
+    cut_gap(&mut mask, params.gap_mm);
+    let bone = count(&mask);
+    Ok((mask, bone, all - kept))
 }
 
 fn cut_gap(mask: &mut Volume<u8>, gap_mm: f64) {
@@ -196,7 +296,12 @@ mod tests {
     use super::*;
 
     fn params() -> PhantomParams {
-        PhantomParams { size_mm: [2.0, 1.6, 1.8], spacing_mm: 0.04, thickness_mm: 0.2, ..Default::default() }
+        PhantomParams {
+            size_mm: [2.0, 1.6, 1.8],
+            spacing_mm: 0.04,
+            thickness_mm: 0.2,
+            ..Default::default()
+        }
     }
 
     #[test]
@@ -204,9 +309,8 @@ mod tests {
         for bvtv in [0.1, 0.25, 0.4] {
             let p = PhantomParams { bvtv, ..params() };
             let s = structure(&p).unwrap().summary;
-            let islands = s.removed_voxels as f64 / (50.0 * 40.0 * 45.0);
-            // One bin of the level's histogram.
-            assert!((s.bv_tv + islands - bvtv).abs() < 1e-3, "{s:?}");
+            // Islands are removed, and their share made up for: measured 0.0002.
+            assert!((s.bv_tv - bvtv).abs() < 2e-3, "{s:?}");
             assert!(s.connects_z, "{s:?}");
         }
     }
@@ -214,10 +318,19 @@ mod tests {
     #[test]
     fn the_same_seed_is_the_same_specimen_at_another_voxel_size() {
         let coarse = structure(&params()).unwrap().mask;
-        let fine = structure(&PhantomParams { spacing_mm: 0.02, ..params() }).unwrap().mask;
+        let fine = structure(&PhantomParams {
+            spacing_mm: 0.02,
+            ..params()
+        })
+        .unwrap()
+        .mask;
         let mut same = 0;
         for ((k, j, i), &v) in coarse.values.indexed_iter() {
-            let eight = fine.values.slice(ndarray::s![2 * k..2 * k + 2, 2 * j..2 * j + 2, 2 * i..2 * i + 2]);
+            let eight = fine.values.slice(ndarray::s![
+                2 * k..2 * k + 2,
+                2 * j..2 * j + 2,
+                2 * i..2 * i + 2
+            ]);
             same += usize::from((eight.iter().filter(|&&b| b == 1).count() >= 4) == (v == 1));
         }
         // Surface voxels differ: measured 0.988.
@@ -229,19 +342,30 @@ mod tests {
         let make = || {
             let mut phantom = structure(&params()).unwrap();
             let scan = scan(&mut phantom, &params());
-            blake3::hash(bytemuck::cast_slice(scan.as_slice())).to_hex().to_string()
+            blake3::hash(bytemuck::cast_slice(scan.as_slice()))
+                .to_hex()
+                .to_string()
         };
-        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(make);
+        let one = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .unwrap()
+            .install(make);
         assert_eq!(one, make());
         assert_eq!(&one[..16], PINNED);
     }
     /// First digits of the hash that this test computed when the phantom was laid down; phantoms are references, so a
     /// change here is a change of all of them.
-    const PINNED: &str = "";
+    const PINNED: &str = "5793adbe65fa5466";
 
     #[test]
     fn a_gap_disconnects_the_faces() {
-        let s = structure(&PhantomParams { gap_mm: 0.2, ..params() }).unwrap().summary;
+        let s = structure(&PhantomParams {
+            gap_mm: 0.2,
+            ..params()
+        })
+        .unwrap()
+        .summary;
         assert!(!s.connects_z);
     }
 }

@@ -29,14 +29,18 @@ pub struct Shape {
 
 impl Shape {
     /// The sheets of `params` with a wavelength at which they fill the right share of the box before holes are cut.
-    pub fn new(params: &PhantomParams, thickness_mm: f64) -> Self {
-        let per_mm = fitted_waves_per_mm(params, thickness_mm);
-        Self::with_waves(params, thickness_mm, per_mm, 1.0)
+    pub fn new(params: &PhantomParams) -> Self {
+        Self::with_waves(params, fitted_waves_per_mm(params), 1.0)
     }
 
-    fn with_waves(params: &PhantomParams, thickness_mm: f64, per_mm: f64, coarse: f64) -> Self {
+    fn with_waves(params: &PhantomParams, per_mm: f64, coarse: f64) -> Self {
+        let thickness_mm = params.thickness_mm;
         let sheets = Waves::new(Numbers::new(params.seed, 0), per_mm, params.anisotropy);
-        let holes = Waves::new(Numbers::new(params.seed, 1), HOLES * per_mm, params.anisotropy);
+        let holes = Waves::new(
+            Numbers::new(params.seed, 1),
+            HOLES * per_mm,
+            params.anisotropy,
+        );
         let step = coarse / (STEPS_PER_WAVE * per_mm * HOLES);
         // One point of margin on either side for the cubic.
         let n = params.size_mm.map(|l| (l / step).ceil() as usize + 4);
@@ -70,7 +74,11 @@ impl Shape {
 
     /// For each voxel the hole level above which it is bone; infinite outside the sheets. Calls `visit(k, levels)` for
     /// every slice, in parallel, and returns the results in order.
-    pub fn slices<R: Send>(&self, grid: &Grid, visit: impl Fn(usize, &[f32]) -> R + Sync) -> Vec<R> {
+    pub fn slices<R: Send>(
+        &self,
+        grid: &Grid,
+        visit: impl Fn(usize, &[f32]) -> R + Sync,
+    ) -> Vec<R> {
         let [tx, ty, tz] = [0, 1, 2].map(|a| self.taps(grid.n[a], grid.spacing_mm[a], self.n[a]));
         let [nx, ny, nz] = grid.n;
         let plane = self.n[0] * self.n[1];
@@ -86,13 +94,17 @@ impl Shape {
                 let mut levels = vec![0f32; nx * ny];
                 for (row, &(base, w)) in levels.chunks_exact_mut(nx).zip(&ty) {
                     let line = slabs.each_ref().map(|slab| {
-                        let at = |t: usize| &slab[(base + t) * self.n[0]..(base + t + 1) * self.n[0]];
+                        let at =
+                            |t: usize| &slab[(base + t) * self.n[0]..(base + t + 1) * self.n[0]];
                         weighted([at(0), at(1), at(2), at(3)], w)
                     });
                     for (level, &(base, w)) in row.iter_mut().zip(&tx) {
-                        let [f, h, g] = line
-                            .each_ref()
-                            .map(|l| l[base] * w[0] + l[base + 1] * w[1] + l[base + 2] * w[2] + l[base + 3] * w[3]);
+                        let [f, h, g] = line.each_ref().map(|l| {
+                            l[base] * w[0]
+                                + l[base + 1] * w[1]
+                                + l[base + 2] * w[2]
+                                + l[base + 3] * w[3]
+                        });
                         *level = self.level(f, h, g);
                     }
                 }
@@ -132,7 +144,12 @@ impl Shape {
     /// Share of the table's points that lie in the sheets.
     fn sheet_share(&self) -> f64 {
         let [f, h, g] = &self.fields;
-        let inside = f.iter().zip(h).zip(g).filter(|((f, h), g)| self.level(**f, **h, **g).is_finite()).count();
+        let inside = f
+            .iter()
+            .zip(h)
+            .zip(g)
+            .filter(|((f, h), g)| self.level(**f, **h, **g).is_finite())
+            .count();
         inside as f64 / f.len() as f64
     }
 }
@@ -140,17 +157,19 @@ impl Shape {
 fn weighted(rows: [&[f32]; 4], w: [f32; 4]) -> Vec<f32> {
     let [a, b, c, d] = rows;
     let pairs = a.iter().zip(b).zip(c.iter().zip(d));
-    pairs.map(|((a, b), (c, d))| a * w[0] + b * w[1] + c * w[2] + d * w[3]).collect()
+    pairs
+        .map(|((a, b), (c, d))| a * w[0] + b * w[1] + c * w[2] + d * w[3])
+        .collect()
 }
 
 /// Waves per mm at which sheets of this thickness fill `BV/TV / (1 − perforation)` of the box.
-fn fitted_waves_per_mm(params: &PhantomParams, thickness_mm: f64) -> f64 {
+fn fitted_waves_per_mm(params: &PhantomParams) -> f64 {
     let wanted = params.bvtv / (1.0 - params.perforation());
     // Area of a Gaussian field's zero level per volume: (2/π) √(k²/3) (Rice), before sheets touch.
-    let mut per_mm = wanted / thickness_mm * 3f64.sqrt() / 4.0;
+    let mut per_mm = wanted / params.thickness_mm * 3f64.sqrt() / 4.0;
     // Few tables of few points: the share is what counts here, and a fixed number of steps repeats everywhere.
     for _ in 0..6 {
-        let share = Shape::with_waves(params, thickness_mm, per_mm, 4.0).sheet_share();
+        let share = Shape::with_waves(params, per_mm, 4.0).sheet_share();
         per_mm *= (wanted / share.max(0.02)).clamp(0.6, 1.6);
     }
     per_mm

@@ -16,7 +16,9 @@ impl Numbers {
     }
 
     pub fn bits(&self, n: u64) -> u64 {
-        mix(self.seed.wrapping_add(n.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
+        mix(self
+            .seed
+            .wrapping_add(n.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
     }
 
     /// Uniform in [0, 1).
@@ -45,7 +47,7 @@ pub fn turn(turns: f64) -> [f64; 2] {
     let x = (turns - turns.round()) * TAU / 8.0;
     let x2 = x * x;
     let mut c = 1.0 - x2 / 2.0 * (1.0 - x2 / 12.0 * (1.0 - x2 / 30.0 * (1.0 - x2 / 56.0)));
-    let mut s = x * (1.0 - x2 / 6.0 * (1.0 - x2 / 20.0 * (1.0 - x2 / 42.0)));
+    let mut s = x * (1.0 - x2 / 6.0 * (1.0 - x2 / 20.0 * (1.0 - x2 / 42.0 * (1.0 - x2 / 72.0))));
     for _ in 0..3 {
         (c, s) = (c * c - s * s, 2.0 * c * s);
     }
@@ -84,15 +86,25 @@ impl Waves {
     }
 
     /// Field and gradient (per mm) on `n` points from `from` in steps of `step` along x.
-    pub fn line(&self, from: [f64; 3], step: f64, n: usize, mut each: impl FnMut(usize, f64, [f64; 3])) {
+    pub fn line(
+        &self,
+        from: [f64; 3],
+        step: f64,
+        n: usize,
+        mut each: impl FnMut(usize, f64, [f64; 3]),
+    ) {
         let amplitude = (2.0 / WAVES as f64).sqrt();
         let at = |w: usize| {
             let q = self.q[w];
             turn(q[0] * from[0] + q[1] * from[1] + q[2] * from[2] + self.phase[w])
         };
         let (mut c, mut s): (Vec<f64>, Vec<f64>) = (0..WAVES).map(at).map(|[c, s]| (c, s)).unzip();
-        let (dc, ds): (Vec<f64>, Vec<f64>) =
-            self.q.iter().map(|q| turn(q[0] * step)).map(|[c, s]| (c, s)).unzip();
+        let (dc, ds): (Vec<f64>, Vec<f64>) = self
+            .q
+            .iter()
+            .map(|q| turn(q[0] * step))
+            .map(|[c, s]| (c, s))
+            .unzip();
         for i in 0..n {
             // Four sums at once, each in a fixed order.
             let mut sums = [[0.0f64; 4]; 4];
@@ -127,7 +139,9 @@ mod tests {
     fn numbers_have_mean_0_and_variance_1() {
         let numbers = Numbers::new(7, 1);
         let n = 200_000;
-        let (sum, square) = (0..n).map(|i| numbers.normal(i)).fold((0.0, 0.0), |(a, b), v| (a + v, b + v * v));
+        let (sum, square) = (0..n)
+            .map(|i| numbers.normal(i))
+            .fold((0.0, 0.0), |(a, b), v| (a + v, b + v * v));
         // Standard errors 0.0022 and 0.0027.
         assert!((sum / n as f64).abs() < 0.01 && (square / n as f64 - 1.0).abs() < 0.015);
     }
@@ -144,7 +158,8 @@ mod tests {
         let (_, g) = value(p);
         for a in 0..3 {
             let h = 1e-4;
-            let shifted = |d: f64| value(std::array::from_fn(|b| p[b] + if a == b { d } else { 0.0 })).0;
+            let shifted =
+                |d: f64| value(std::array::from_fn(|b| p[b] + if a == b { d } else { 0.0 })).0;
             let difference = (shifted(h) - shifted(-h)) / (2.0 * h);
             // turn() is good to 1e-9: differences over 2e-4 to about 1e-5.
             assert!((g[a] - difference).abs() < 1e-4, "{g:?} {difference}");

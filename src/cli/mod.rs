@@ -114,6 +114,7 @@ fn session(shared: &Shared) -> Result<Session> {
         verbose: shared.verbose,
         dry_run: shared.dry_run,
         force: shared.force,
+        ..Session::default()
     })
 }
 

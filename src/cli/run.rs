@@ -3,28 +3,45 @@
 use super::lattice::LatticeSettings;
 use super::segment::SegmentSettings;
 use super::solve::SolveSettings;
+use super::{print_json, words};
 use bonepd_ct::error::Result;
 use bonepd_ct::recipe::Recipe;
 use bonepd_ct::run::Outcome;
+use bonepd_ct::run::cohort::{Resources, cohort};
+use bonepd_ct::run::scans::Selection;
 use bonepd_ct::run::session::Session;
 use clap::Args;
+use glob::Pattern;
 use std::path::PathBuf;
 
 /// Take scans through all steps of a recipe: segment, lattice, solve, report
 ///
 /// Each scan stands alone: one that fails is named at the end (exit code 1) and the others finish. Results are in
-/// OUT/<scan>/, all rows together in OUT/results.csv, tables and figures in OUT/report/. A setting given here wins over
-/// the recipe's.
+/// OUT/<scan>/ with a log, all rows together in OUT/results.csv, tables and figures in OUT/report/. A setting given here wins over
+/// the recipe's. Started again, a run keeps what is up to date and goes on where it was stopped.
 #[derive(Args)]
 pub struct RunArgs {
     /// Recipe file (TOML); `pipelines/` has examples
     recipe: PathBuf,
-    /// Scans, or folders of scans; a folder of slices is one scan
+    /// Scans, folders of scans (a folder of slices is one scan), or manifests (.csv with a column path, and any of name,
+    /// subject, group, spacing_mm, lower, upper, otsu, gaussian_voxels)
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// Folder for the results
     #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
+    /// Scans at a time
+    #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: u16,
+    /// Memory that scans running at a time may take together, by estimate [default: what is free]
+    #[arg(long, value_name = "MIB", value_parser = words::positive)]
+    memory_mib: Option<f64>,
+    /// Look for scans in folders of folders; a scan is then named after the folders on the way
+    #[arg(long)]
+    recursive: bool,
+    /// In folders, take only files and folders whose name matches, as "*_L3*.nii.gz"
+    #[arg(long, value_name = "PATTERN", value_parser = Pattern::new)]
+    pattern: Option<Pattern>,
     #[command(flatten)]
     segment: SegmentSettings,
     #[command(flatten)]
@@ -33,10 +50,29 @@ pub struct RunArgs {
     solve: SolveSettings,
 }
 
-pub fn run(args: &RunArgs, session: &Session, _json: bool) -> Result<Outcome> {
+pub fn run(args: &RunArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut recipe = Recipe::read(&args.recipe)?;
     args.segment.apply(&mut recipe.segment)?;
     args.lattice.apply(&mut recipe.lattice)?;
     args.solve.apply(&mut recipe.solve)?;
-    bonepd_ct::run::cohort::cohort(&recipe, &args.inputs, &args.out, session)
+    let selection = Selection {
+        recursive: args.recursive,
+        pattern: args.pattern.clone(),
+    };
+    let resources = Resources {
+        jobs: args.jobs.into(),
+        memory_mib: args.memory_mib,
+    };
+    let (outcome, scans) = cohort(
+        &recipe,
+        &args.inputs,
+        &args.out,
+        &selection,
+        &resources,
+        session,
+    )?;
+    if json {
+        print_json(&scans);
+    }
+    Ok(outcome)
 }

@@ -80,7 +80,7 @@ impl SegmentSettings {
 pub fn run(args: &SegmentArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut params = SegmentParams::default();
     args.settings.apply(&mut params)?;
-    let summary = bonepd_ct::run::segment::segment(&args.input, &args.out, &params, session)?;
+    let summary = bonepd_ct::run::segment::segment(&args.input, &args.out, None, &params, session)?;
     if json {
         print_json(&summary);
     }

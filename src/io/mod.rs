@@ -1,6 +1,7 @@
 //! Files: one format a file. [`scan`] is the way in, [`specimen`] the segmented scan on disk, [`atomic`] the way out.
 
 pub mod atomic;
+pub mod extent;
 pub mod lammps;
 pub mod markdown;
 pub mod nifti;

@@ -64,6 +64,11 @@ fn file_name(path: &Path) -> String {
         .into_owned()
 }
 
+/// Whether a file is taken for a slice, by its name.
+pub fn is_slice(path: &Path) -> bool {
+    path.is_file() && extension(path).is_some()
+}
+
 /// The kind of slice a file is, by its name; hidden files are none.
 fn extension(path: &Path) -> Option<&'static str> {
     let name = file_name(path).to_lowercase();

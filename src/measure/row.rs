@@ -48,4 +48,7 @@ pub struct Row {
     pub tolerance: Option<f64>,
     /// What a reader must know of this row (no path between the faces, not converged, ...).
     pub note: Option<String>,
+    /// From a manifest.
+    pub group: Option<String>,
+    pub subject: Option<String>,
 }

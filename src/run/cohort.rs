@@ -1,18 +1,246 @@
 //! Owns `run`: one recipe over scans and folders of scans, each scan on its own.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::io::{atomic, table};
+use crate::measure::row::Row;
 use crate::recipe::Recipe;
+use crate::run::estimate::{Estimate, estimate};
+use crate::run::queue;
+use crate::run::scans::{self, ScanJob, Selection};
 use crate::run::session::Session;
-use crate::run::{Outcome, not_available};
+use crate::run::{Outcome, host, lattice, report, segment, solve};
+use indicatif::ProgressBar;
+use serde::Serialize;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// What a run may use.
+#[derive(Debug, Clone)]
+pub struct Resources {
+    /// Scans at a time.
+    pub jobs: usize,
+    /// Memory all scans together may take by estimate; None: what is free, less a tenth.
+    pub memory_mib: Option<f64>,
+}
+
+/// What became of a scan.
+#[derive(Debug, Clone, Serialize)]
+pub struct ScanResult {
+    pub scan: String,
+    pub input: PathBuf,
+    /// `done`, `not converged`, `failed`, or `planned` in a dry run.
+    pub state: &'static str,
+    pub error: Option<String>,
+    pub rows: usize,
+    pub estimate: Estimate,
+}
 
 /// Takes every scan under `inputs` through segment, lattice and solve into `out/<scan>/`, then writes `out/results.csv`
-/// and `out/report/`. A scan that fails is named in the outcome; the others finish.
+/// and `out/report/`. What is up to date is kept. A scan that fails is named in the outcome; the others finish.
+///
+/// # Errors
+/// No scans, an output folder that cannot be written; with a single scan, what is wrong with it.
 pub fn cohort(
-    _recipe: &Recipe,
-    _inputs: &[PathBuf],
-    _out: &Path,
-    _session: &Session,
-) -> Result<Outcome> {
-    Err(not_available("run"))
+    recipe: &Recipe,
+    inputs: &[PathBuf],
+    out: &Path,
+    selection: &Selection,
+    resources: &Resources,
+    session: &Session,
+) -> Result<(Outcome, Vec<ScanResult>)> {
+    let jobs = scans::find(inputs, &recipe.segment, selection, session)?;
+    let estimates: Vec<Estimate> = jobs
+        .iter()
+        .map(|job| estimate(&job.input, job.segment.spacing_mm, recipe))
+        .collect();
+    if session.dry_run {
+        return Ok((Outcome::Done, plan(&jobs, &estimates, out, session)));
+    }
+    let run = Run {
+        recipe,
+        out,
+        jobs: &jobs,
+        session,
+        bar: session.bar(jobs.len() as u64, "scans"),
+        done: Mutex::new(vec![None; jobs.len()]),
+    };
+    let memory: Vec<f64> = estimates.iter().map(|e| e.memory_mib).collect();
+    let limit = resources
+        .memory_mib
+        .or_else(|| host::available_mib().map(|free| 0.9 * free));
+    queue::run(
+        &memory,
+        resources.jobs,
+        limit.unwrap_or(f64::INFINITY),
+        |i| run.scan(i),
+    );
+    run.bar.finish_and_clear();
+    run.finish(&estimates)
+}
+
+/// A run under way.
+struct Run<'a> {
+    recipe: &'a Recipe,
+    out: &'a Path,
+    jobs: &'a [ScanJob],
+    session: &'a Session,
+    bar: ProgressBar,
+    /// By scan, in the order of the inputs.
+    done: Mutex<Vec<Option<Result<Vec<Row>>>>>,
+}
+
+impl Run<'_> {
+    /// One scan, whatever happens to it.
+    fn scan(&self, i: usize) {
+        let job = &self.jobs[i];
+        let dir = self.out.join(&job.name);
+        let own = self.session.logged(dir.join("log.txt"));
+        own.note(&format!(
+            "{} {}: {}",
+            env!("CARGO_PKG_NAME"),
+            env!("CARGO_PKG_VERSION"),
+            job.input.display()
+        ));
+        let solved = catch_unwind(AssertUnwindSafe(|| steps(self.recipe, job, &dir, &own)))
+            .unwrap_or_else(|_| {
+                Err(Error::specimen(
+                    "the program failed on this scan (a bug)",
+                    "report it with the scan's log",
+                ))
+            });
+        match &solved {
+            Ok(rows) => {
+                own.note("done");
+                self.session
+                    .say(format!("{}: {}", job.name, in_words(rows)));
+            }
+            Err(e) => {
+                own.note(&format!("failed: {e}"));
+                if self.jobs.len() > 1 {
+                    own.flush();
+                    self.session.warn(format!("{} failed: {e}", job.name));
+                }
+            }
+        }
+        let mut done = self.done.lock().expect("scans do not panic here");
+        done[i] = Some(solved);
+        if let Err(e) = self.write_rows(&done) {
+            self.session.warn(e.to_string());
+        }
+        self.bar.inc(1);
+    }
+
+    /// All rows so far, in the order of the scans.
+    fn write_rows(&self, done: &[Option<Result<Vec<Row>>>]) -> Result<Vec<Row>> {
+        let solved = done.iter().flatten().flatten();
+        let rows: Vec<Row> = solved.flatten().cloned().collect();
+        if !rows.is_empty() {
+            table::write(&self.out.join("results.csv"), &rows)?;
+        }
+        Ok(rows)
+    }
+
+    /// The table, the report, and what became of each scan.
+    fn finish(self, estimates: &[Estimate]) -> Result<(Outcome, Vec<ScanResult>)> {
+        let mut done = self.done.lock().expect("scans do not panic here").clone();
+        if let [Some(Err(only))] = &done[..] {
+            return Err(only.clone());
+        }
+        atomic::create_dir(self.out)?;
+        let rows = self.write_rows(&done)?;
+        if !rows.is_empty() {
+            report::write(
+                &rows,
+                &self.recipe.report,
+                &self.out.join("report"),
+                self.session,
+            )?;
+        }
+        let results: Vec<ScanResult> = self
+            .jobs
+            .iter()
+            .zip(estimates)
+            .zip(done.drain(..))
+            .map(|((job, estimate), solved)| result(job, *estimate, solved))
+            .collect();
+        Ok((outcome(&results), results))
+    }
+}
+
+/// The steps of one scan.
+fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Result<Vec<Row>> {
+    segment::segment(&job.input, dir, Some(&job.name), &job.segment, session)?;
+    if lattice::settings(dir).ok().as_ref() != Some(&recipe.lattice) || session.force {
+        lattice::lattice(dir, &recipe.lattice, &[], session)?;
+    }
+    let mut rows = solve::solve(dir, &recipe.lattice, &recipe.solve, session)?;
+    for row in &mut rows {
+        row.group.clone_from(&job.group);
+        row.subject.clone_from(&job.subject);
+    }
+    Ok(rows)
+}
+
+fn in_words(rows: &[Row]) -> String {
+    let stalled = rows
+        .iter()
+        .filter(|row| row.converged == Some(false))
+        .count();
+    match stalled {
+        0 => format!("{} rows", rows.len()),
+        n => format!("{} rows, {n} not converged", rows.len()),
+    }
+}
+
+fn result(job: &ScanJob, estimate: Estimate, solved: Option<Result<Vec<Row>>>) -> ScanResult {
+    let (state, error, rows) = match solved {
+        Some(Ok(rows)) if rows.iter().any(|row| row.converged == Some(false)) => {
+            ("not converged", None, rows.len())
+        }
+        Some(Ok(rows)) => ("done", None, rows.len()),
+        Some(Err(e)) => ("failed", Some(e.to_string()), 0),
+        None => ("planned", None, 0),
+    };
+    ScanResult {
+        scan: job.name.clone(),
+        input: job.input.clone(),
+        state,
+        error,
+        rows,
+        estimate,
+    }
+}
+
+fn outcome(results: &[ScanResult]) -> Outcome {
+    let in_state = |state| results.iter().filter(move |r| r.state == state);
+    let failed: Vec<String> = in_state("failed").map(|r| r.scan.clone()).collect();
+    match (failed.is_empty(), in_state("not converged").next()) {
+        (false, _) => Outcome::SomeFailed(failed),
+        (true, Some(_)) => Outcome::NotConverged,
+        (true, None) => Outcome::Done,
+    }
+}
+
+/// What would run, with rough needs.
+fn plan(
+    jobs: &[ScanJob],
+    estimates: &[Estimate],
+    out: &Path,
+    session: &Session,
+) -> Vec<ScanResult> {
+    for (job, e) in jobs.iter().zip(estimates) {
+        session.say(format!(
+            "{} <- {}: {e}",
+            out.join(&job.name).display(),
+            job.input.display()
+        ));
+    }
+    let hours = estimates.iter().filter_map(|e| e.time_s).sum::<f64>() / 3600.0;
+    session.say(format!(
+        "{} scans, about {hours:.2} h one after the other",
+        jobs.len()
+    ));
+    let planned = jobs.iter().zip(estimates);
+    planned.map(|(job, e)| result(job, *e, None)).collect()
 }

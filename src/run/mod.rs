@@ -1,13 +1,17 @@
 //! Recipes on real scans: each verb of the program is one function here, from paths and settings to files.
 
 pub mod cohort;
+pub mod estimate;
 pub mod host;
 pub mod info;
 pub mod lattice;
+pub mod manifest;
 pub mod meter;
 pub mod phantom;
+pub mod queue;
 pub mod report;
 pub mod results;
+pub mod scans;
 pub mod scene;
 pub mod segment;
 pub mod session;

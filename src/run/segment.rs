@@ -9,10 +9,11 @@ use crate::volume::{Specimen, Volume};
 use std::path::Path;
 
 /// Segments `input` (a file, or a folder of slices) into `dir`. What is up to date (same input, settings and version)
-/// is kept unless the session forces.
+/// is kept unless the session forces. `name` overrides the scan's own.
 pub fn segment(
     input: &Path,
     dir: &Path,
+    name: Option<&str>,
     params: &SegmentParams,
     session: &Session,
 ) -> Result<SegmentRecord> {
@@ -23,12 +24,16 @@ pub fn segment(
     };
     if let Some(kept) = specimen::record(dir)
         && !session.force
+        && name.is_none_or(|name| name == kept.scan)
         && up_to_date(&kept, dir, params, (&blake3, &voi_blake3))
     {
         session.say(format!("{}: up to date", dir.display()));
         return Ok(kept);
     }
-    let scan = scan::read(input, params.spacing_mm)?;
+    let mut scan = scan::read(input, params.spacing_mm)?;
+    if let Some(name) = name {
+        scan.name = name.to_owned();
+    }
     scan.notes
         .iter()
         .for_each(|note| session.say(format!("{}: {note}", scan.name)));
@@ -88,6 +93,8 @@ fn write(
     specimen: &Specimen,
 ) -> Result<()> {
     atomic::create_dir(dir)?;
+    // An old record must not vouch for a new mask, should the program be stopped between the two.
+    let _ = std::fs::remove_file(dir.join(specimen::RECORD));
     let picture_path = dir.join(specimen::PICTURE);
     match &record.settings.crop {
         Some(crop) => picture::write(&picture_path, &scan.cropped(crop), &specimen.bone)?,

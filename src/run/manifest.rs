@@ -1,0 +1,175 @@
+//! Owns manifests: a CSV with one line per scan, its path and what is special about it.
+
+use crate::error::{Error, Result};
+use crate::io::scan;
+use crate::run::scans::ScanJob;
+use crate::stage::segment::SegmentParams;
+use std::path::Path;
+
+/// The columns a manifest may have; `path` it must. Empty cells and `NA` leave the recipe's setting.
+const COLUMNS: [&str; 9] = [
+    "path",
+    "name",
+    "subject",
+    "group",
+    "spacing_mm",
+    "lower",
+    "upper",
+    "otsu",
+    "gaussian_voxels",
+];
+
+/// The scans of a manifest. Paths are relative to its folder.
+pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
+    let wrong = |found: String| {
+        Error::file(
+            path,
+            found,
+            format!(
+                "a manifest is a CSV with a header of these columns: {}",
+                COLUMNS.join(", ")
+            ),
+        )
+    };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let header = reader
+        .headers()
+        .map_err(|e| wrong(format!("cannot be read: {e}")))?
+        .clone();
+    check_header(&header).map_err(wrong)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut jobs = Vec::new();
+    for (n, record) in reader.records().enumerate() {
+        let record = record.map_err(|e| wrong(format!("cannot be read: {e}")))?;
+        let cell = |column: &str| {
+            let at = header.iter().position(|name| name == column)?;
+            record
+                .get(at)
+                .filter(|cell| !cell.is_empty() && *cell != "NA")
+        };
+        let job =
+            job(cell, folder, params).map_err(|found| wrong(format!("line {}: {found}", n + 2)))?;
+        job.segment.check()?;
+        jobs.push(job);
+    }
+    if jobs.is_empty() {
+        return Err(wrong("lists no scans".to_owned()));
+    }
+    Ok(jobs)
+}
+
+fn check_header(header: &csv::StringRecord) -> std::result::Result<(), String> {
+    for name in header {
+        if !COLUMNS.contains(&name) {
+            let nearest = COLUMNS.iter().max_by(|a, b| {
+                strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b))
+            });
+            return Err(format!(
+                "unknown column `{name}`; did you mean `{}`?",
+                nearest.unwrap_or(&"path")
+            ));
+        }
+    }
+    match header.iter().any(|name| name == "path") {
+        true => Ok(()),
+        false => Err("has no column `path`".to_owned()),
+    }
+}
+
+fn job<'a>(
+    cell: impl Fn(&str) -> Option<&'a str>,
+    folder: &Path,
+    params: &SegmentParams,
+) -> std::result::Result<ScanJob, String> {
+    let number = |column: &str| match cell(column).map(str::parse::<f64>) {
+        None => Ok(None),
+        Some(Ok(v)) if v.is_finite() => Ok(Some(v)),
+        _ => Err(format!(
+            "expected a number in `{column}`, found `{}`",
+            cell(column).unwrap_or_default()
+        )),
+    };
+    let input = folder.join(cell("path").ok_or("no path")?);
+    let mut segment = params.clone();
+    let (lower, upper) = (number("lower")?, number("upper")?);
+    if lower.is_some() || upper.is_some() {
+        (segment.lower, segment.upper, segment.otsu) = (lower, upper, false);
+    }
+    match cell("otsu") {
+        Some("true" | "TRUE" | "1" | "yes") => {
+            (segment.otsu, segment.lower, segment.upper) = (true, None, None);
+        }
+        None | Some("false" | "FALSE" | "0" | "no") => {}
+        Some(other) => return Err(format!("expected true or false in `otsu`, found `{other}`")),
+    }
+    segment.spacing_mm = number("spacing_mm")?.map(|h| [h; 3]).or(segment.spacing_mm);
+    segment.gaussian_voxels = number("gaussian_voxels")?.unwrap_or(segment.gaussian_voxels);
+    let text = |column| cell(column).map(str::to_owned);
+    Ok(ScanJob {
+        name: text("name").unwrap_or_else(|| scan::name(&input)),
+        input,
+        segment,
+        group: text("group"),
+        subject: text("subject"),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str) -> Result<Vec<ScanJob>> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cohort.csv");
+        std::fs::write(&path, text).unwrap();
+        let params = SegmentParams {
+            lower: Some(5.0),
+            ..SegmentParams::default()
+        };
+        let jobs = read(&path, &params)?;
+        assert!(jobs[0].input.starts_with(dir.path()));
+        Ok(jobs)
+    }
+
+    #[test]
+    fn each_line_is_a_scan_with_its_own_settings() {
+        let jobs = read_text(
+            "path, group, lower, spacing_mm, name\nscans/a.nii, OA, 200, 0.02, first\nscans/b.nii, NA, , , \n",
+        )
+        .unwrap();
+        assert_eq!(jobs.len(), 2);
+        assert_eq!(
+            (jobs[0].name.as_str(), jobs[1].name.as_str()),
+            ("first", "b")
+        );
+        assert_eq!(
+            (jobs[0].group.as_deref(), &jobs[1].group),
+            (Some("OA"), &None)
+        );
+        assert_eq!(
+            (jobs[0].segment.lower, jobs[1].segment.lower),
+            (Some(200.0), Some(5.0))
+        );
+        assert_eq!(
+            (jobs[0].segment.spacing_mm, jobs[1].segment.spacing_mm),
+            (Some([0.02; 3]), None)
+        );
+    }
+
+    #[test]
+    fn a_manifest_that_cannot_be_meant_is_said() {
+        for (text, said) in [
+            ("path,grup\na.nii,x\n", "did you mean `group`"),
+            ("name\na\n", "no column `path`"),
+            ("path,lower\na.nii,high\n", "line 2"),
+            ("path,lower\n", "lists no scans"),
+            ("path,lower,upper\na.nii,9,3\n", "above upper"),
+        ] {
+            let words = read_text(text).unwrap_err().to_string();
+            assert!(words.contains(said), "{text:?} said: {words}");
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! One test program. Each module is one subject.
 
 mod cli;
+mod cohort;
 mod laws;
 mod layers;
 mod patch;

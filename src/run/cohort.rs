@@ -236,9 +236,9 @@ fn plan(
             job.input.display()
         ));
     }
-    let hours = estimates.iter().filter_map(|e| e.time_s).sum::<f64>() / 3600.0;
+    let minutes = estimates.iter().filter_map(|e| e.time_s).sum::<f64>() / 60.0;
     session.say(format!(
-        "{} scans, about {hours:.2} h one after the other",
+        "scans: {}; about {minutes:.1} min one after the other",
         jobs.len()
     ));
     let planned = jobs.iter().zip(estimates);

@@ -1,6 +1,7 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
 use crate::error::Result;
+use crate::io::specimen;
 use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
 use crate::run::meter::Meter;
@@ -30,6 +31,7 @@ pub fn solve(
     lattice.check()?;
     params.check()?;
     let specimen = load(dir)?;
+    warn_of_coarse(dir, lattice, session);
     let mut results = Results::open(dir, session.force)?;
     let mut rows = Vec::new();
     for case in lattice.cases() {
@@ -52,6 +54,20 @@ pub fn solve(
         rows.push(row);
     }
     Ok(with_ffb(&rows))
+}
+
+/// Struts thinner than two lattice parameters are one or two sites thick.
+fn warn_of_coarse(dir: &Path, lattice: &LatticeParams, session: &Session) {
+    let thickness = specimen::record(dir).and_then(|record| record.results.mean_thickness_mm);
+    let Some(thickness) = thickness else { return };
+    let coarse = lattice.lp_mm.iter().filter(|lp| **lp > 0.5 * thickness);
+    let coarse: Vec<String> = coarse.map(f64::to_string).collect();
+    if !coarse.is_empty() {
+        session.warn(format!(
+            "lattice parameters {} mm exceed half the mean strut thickness ({thickness:.3} mm): E_app is far from converged there",
+            coarse.join(", ")
+        ));
+    }
 }
 
 /// The row of a solve before it is made: its settings.

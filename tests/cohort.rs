@@ -18,9 +18,12 @@ fn scan(path: &Path, seed: usize, n: usize) {
     let grid = Grid::new([n, n, n], [0.05; 3]);
     let pore = |at: usize| {
         let [i, j, k] = [at % n, at / n % n, at / n / n];
-        let hole = [i / 3 + seed, j / 3 + 2 * seed, k / 3 + 3 * seed]
-            .iter()
-            .fold(seed, |h, v| h * 31 + v);
+        let mix = |h: u64, v: usize| {
+            (h ^ v as u64)
+                .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+                .rotate_left(31)
+        };
+        let hole = [seed, i / 3, j / 3, k / 3].into_iter().fold(1, mix);
         hole % 5 == 0 && k > 1 && k + 2 < n
     };
     let voxels = (0..grid.len()).map(|at| if pore(at) { 0i16 } else { 1000 });
@@ -108,12 +111,14 @@ fn what_is_up_to_date_is_kept_and_what_changed_is_redone() {
     assert_eq!(run(&args).0, 0);
     let third = rows(&out);
     assert_eq!(third[..6], first[..6]);
-    assert!(
-        third[6..]
+    // Floppy: firm padding fills pores this small, so that it does not tell the two scans apart.
+    let floppy = |rows: &[Row]| -> Vec<Option<f64>> {
+        let own = rows
             .iter()
-            .zip(&first[6..])
-            .all(|(a, b)| a.e_app_mpa != b.e_app_mpa)
-    );
+            .filter(|row| row.boundary.as_deref() == Some("floppy"));
+        own.map(|row| row.e_app_mpa).collect()
+    };
+    assert_ne!(floppy(&third[6..]), floppy(&first[6..]));
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Algorithms that see an operator, never the physics behind it.
 
+pub mod amg;
 pub mod cg;
 pub mod chord;
 pub mod direct;

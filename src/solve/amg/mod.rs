@@ -1,0 +1,182 @@
+//! Owns the preconditioner: algebraic multigrid by smoothed aggregation with rigid motions.
+//!
+//! Sites are grouped into aggregates of connected neighbours; the coarse unknowns are the six rigid motions of each
+//! (Vaněk, Mandel & Brezina 1996). The finest level is the caller's operator and is never assembled, nor is its
+//! prolongator; the coarser ones are assembled, each coarsened by its own graph. All of it is in single precision:
+//! it only has to be a good guess.
+
+mod aggregate;
+mod blocks;
+mod chebyshev;
+mod coarse;
+mod coarsest;
+mod cycle;
+mod fine;
+mod galerkin;
+mod level;
+mod rigid;
+
+use crate::operator::Preconditioner;
+use crate::operator::coarsen::Coarsen;
+use crate::operator::held::Held;
+use chebyshev::{Chebyshev, largest_eigenvalue};
+use coarse::Coarse;
+use coarsest::Coarsest;
+use cycle::{Smoothing, Vectors, cycle};
+use fine::Fine;
+use level::{Level, Six};
+use rayon::prelude::*;
+use std::sync::Mutex;
+
+/// How to coarsen and smooth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AmgParams {
+    /// Edges of the boxes in which the finest level's sites are aggregated, in mm: three to five sites wide.
+    pub box_mm: [f64; 3],
+    /// Degree of the smoother on the finest level and on the others.
+    pub degrees: [usize; 2],
+    /// Sites at which a level is factorised instead of coarsened.
+    pub coarsest: usize,
+}
+
+impl AmgParams {
+    /// Boxes four sites wide.
+    pub fn new(spacing_mm: [f64; 3]) -> Self {
+        AmgParams {
+            box_mm: spacing_mm.map(|h| 4.0 * h),
+            degrees: [2, 2],
+            coarsest: 200,
+        }
+    }
+}
+
+/// `z ≈ A⁻¹ r` by one symmetric V-cycle.
+pub struct Amg<'a, O> {
+    fine: Fine<'a, O>,
+    how: Smoothing,
+    coarse: Vec<(Coarse, Smoothing)>,
+    coarsest: Coarsest,
+    /// Made once, used by one cycle at a time.
+    room: Mutex<Room>,
+}
+
+struct Room {
+    fine: Vectors<3>,
+    /// One for every assembled level, the coarsest among them.
+    coarse: Vec<Vectors<6>>,
+}
+
+impl<'a, O: Coarsen> Amg<'a, O> {
+    pub fn new(operator: &'a O, held: &Held, params: &AmgParams) -> Self {
+        let (fine, mut bodies) = Fine::new(operator, held, params.box_mm);
+        let how = smoothing(&fine, params.degrees[0]);
+        let mut matrix = galerkin::product(&fine, how.omega, fine.aggregates.count);
+        galerkin::change_basis(&mut matrix, &bodies);
+        let mut coarse: Vec<(Coarse, Smoothing)> = Vec::new();
+        while matrix.rows() > params.coarsest {
+            let (level, next) = Coarse::new(matrix, &bodies);
+            let how = smoothing(&level, params.degrees[1]);
+            matrix = galerkin::product(&level, how.omega, next.len());
+            let stuck = 10 * next.len() > 9 * level.sites();
+            bodies = next;
+            coarse.push((level, how));
+            if stuck {
+                break;
+            }
+        }
+        let mut rooms: Vec<Vectors<6>> = coarse
+            .iter()
+            .map(|(l, _)| Vectors::new(l.sites()))
+            .collect();
+        rooms.push(Vectors::new(matrix.rows()));
+        let room = Room {
+            fine: Vectors::new(fine.sites()),
+            coarse: rooms,
+        };
+        Amg {
+            fine,
+            how,
+            coarse,
+            coarsest: Coarsest::new(&matrix),
+            room: Mutex::new(room),
+        }
+    }
+
+    /// Sites of each level, finest first.
+    pub fn levels(&self) -> Vec<usize> {
+        let fine = [
+            self.fine.aggregates.members.len(),
+            self.fine.aggregates.count,
+        ];
+        let coarse = self.coarse.iter().map(|(l, _)| l.aggregates.count);
+        fine.into_iter().chain(coarse).collect()
+    }
+
+    /// Bytes of the assembled levels.
+    pub fn coarse_bytes(&self) -> usize {
+        self.coarse.iter().map(|(l, _)| l.bytes()).sum()
+    }
+
+    fn coarse_cycle(&self, depth: usize, rooms: &mut [Vectors<6>]) {
+        let (here, below) = rooms.split_at_mut(1);
+        let here = &mut here[0];
+        match self.coarse.get(depth) {
+            None => self.coarsest.solve(&here.b, &mut here.x),
+            Some((level, how)) => cycle(level, &level.aggregates, how, here, |collect, prolong| {
+                collect(&mut below[0].b);
+                self.coarse_cycle(depth + 1, below);
+                prolong(&below[0].x);
+            }),
+        }
+    }
+}
+
+/// A margin over the eigenvalue that power iteration found from below.
+const MARGIN: f32 = 1.1;
+
+fn smoothing<const D: usize>(level: &impl Level<D>, degree: usize) -> Smoothing {
+    let largest = (MARGIN * largest_eigenvalue(level)).max(f32::MIN_POSITIVE);
+    // What a polynomial of this degree damps well: its interval begins at about 1 / (2 degree)².
+    let range = [4.0, 8.0, 16.0, 25.0][degree.clamp(1, 4) - 1];
+    Smoothing {
+        smoother: Chebyshev::new(largest, range, degree),
+        omega: 4.0 / 3.0 / largest,
+    }
+}
+
+impl<O: Coarsen> Preconditioner<3> for Amg<'_, O> {
+    fn apply(&self, r: &[[f64; 3]], z: &mut [[f64; 3]]) {
+        let largest = r
+            .par_iter()
+            .map(|v| v[0].abs().max(v[1].abs()).max(v[2].abs()))
+            .reduce(|| 0.0, f64::max);
+        if !(largest > 0.0 && largest.is_finite()) {
+            z.par_iter_mut().for_each(|z| *z = [0.0; 3]);
+            return;
+        }
+        let mut room = self.room.lock().unwrap_or_else(|e| e.into_inner());
+        let Room { fine, coarse } = &mut *room;
+        let shrink = largest.recip();
+        fine.b
+            .par_iter_mut()
+            .zip(r)
+            .for_each(|(b, r)| *b = r.map(|v| (v * shrink) as f32));
+        cycle(
+            &self.fine,
+            &self.fine.aggregates,
+            &self.how,
+            fine,
+            |collect, prolong| {
+                let mut raw: Vec<Six> = vec![[0.0; 6]; coarse[0].b.len()];
+                collect(&mut raw);
+                self.fine.to_basis(&raw, &mut coarse[0].b);
+                self.coarse_cycle(0, coarse);
+                self.fine.from_basis(&coarse[0].x, &mut raw);
+                prolong(&raw);
+            },
+        );
+        z.par_iter_mut()
+            .zip(&fine.x)
+            .for_each(|(z, x)| *z = x.map(|v| f64::from(v) * largest));
+    }
+}

@@ -11,13 +11,14 @@ use crate::topology::voxels::VoxelMesh;
 use element::Integration;
 use rayon::prelude::*;
 use std::ops::Range;
-use stencils::Stencils;
+use stencils::{Couplings, Stencils};
 
 /// `A u` is the vector of nodal forces (N) of the displacements `u` (mm), without any support.
 pub struct Hex8 {
     pub mesh: VoxelMesh,
     double: Stencils<f64>,
     single: Stencils<f32>,
+    couplings: Couplings,
 }
 
 impl Hex8 {
@@ -28,6 +29,7 @@ impl Hex8 {
         Hex8 {
             mesh,
             single: double.to_f32(),
+            couplings: Couplings::new(&double),
             double,
         }
     }
@@ -62,27 +64,16 @@ impl Coarsen for Hex8 {
         let Some((segment, _)) = self.mesh.segments_in(site..site + 1).next() else {
             return;
         };
-        for d in neighbours(around) {
-            let column = segment.rows[d[1] + 3 * d[2]] + d[0] as u32 - 1;
-            blocks.push((column, self.double.block(around, d)));
-        }
+        let neighbours = self.couplings.of(around).iter();
+        blocks.extend(neighbours.map(|c| {
+            let column = segment.rows[c.row as usize] + u32::from(c.dx) - 1;
+            (column, c.block)
+        }));
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
         kernel::rows_f32(&self.mesh, &self.single, sites, x, y);
     }
-}
-
-/// The neighbours (dx, dy, dz) + 1 of a node, itself among them, that share an element with it.
-fn neighbours(around: u8) -> impl Iterator<Item = [usize; 3]> {
-    (0..27usize)
-        .map(|i| [i % 3, i / 3 % 3, i / 9])
-        .filter(move |d| {
-            (0..8usize).any(|e| {
-                let shared = (0..3).all(|a| d[a] == 1 || (d[a] == 2) == (e >> a & 1 == 1));
-                around >> e & 1 == 1 && shared
-            })
-        })
 }
 
 #[cfg(test)]

@@ -57,6 +57,54 @@ impl Stencils<f64> {
     }
 }
 
+/// The non-zero blocks of every stencil.
+#[derive(Debug, Clone)]
+pub struct Couplings {
+    starts: Vec<u32>,
+    all: Vec<Coupling>,
+}
+
+/// The block that couples a node to its neighbour at `dx` (0, 1 or 2) in a row of neighbours.
+#[derive(Debug, Clone, Copy)]
+pub struct Coupling {
+    pub row: u8,
+    pub dx: u8,
+    pub block: Block,
+}
+
+impl Couplings {
+    pub fn new(stencils: &Stencils<f64>) -> Self {
+        let (mut starts, mut all) = (vec![0], Vec::new());
+        for around in 0..=255u8 {
+            for i in 0..27usize {
+                let (row, dx) = (i / 3, i % 3);
+                if shares_element(around, [dx, row % 3, row / 3]) {
+                    all.push(Coupling {
+                        row: row as u8,
+                        dx: dx as u8,
+                        block: stencils.block(around, row, dx),
+                    });
+                }
+            }
+            starts.push(all.len() as u32);
+        }
+        Couplings { starts, all }
+    }
+
+    pub fn of(&self, around: u8) -> &[Coupling] {
+        let i = around as usize;
+        &self.all[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
+}
+
+/// Whether a node and its neighbour `d` (each 0, 1 or 2) have an element in common.
+fn shares_element(around: u8, d: [usize; 3]) -> bool {
+    (0..8usize).any(|e| {
+        let reaches = (0..3).all(|a| d[a] == 1 || (d[a] == 2) == ((e >> a) & 1 == 1));
+        around >> e & 1 == 1 && reaches
+    })
+}
+
 /// Place of the coefficient of displacement `column` (3 dx + component) of a row in force component `a`.
 fn slot(row: usize, a: usize, column: usize) -> usize {
     if column < 8 {

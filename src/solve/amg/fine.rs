@@ -1,6 +1,7 @@
 //! Owns the finest level: the caller's operator, never assembled.
 
 use super::aggregate::Aggregates;
+use super::diagonal::{self, Diagonal};
 use super::level::{Level, Modes, NONE, Six};
 use super::rigid::{self, Basis, Mat6};
 use crate::operator::coarsen::{Block, Coarsen};
@@ -10,8 +11,8 @@ use std::ops::Range;
 
 pub struct Fine<'a, O> {
     operator: &'a O,
-    /// Inverse diagonal, zero in held components and at padding.
-    inverse: Vec<[f32; 3]>,
+    /// Inverse diagonal blocks, zero in held components and at padding.
+    inverse: Diagonal,
     pub aggregates: Aggregates,
     /// Site relative to its aggregate's centre, in units of the aggregate's radius.
     local: Vec<[f32; 3]>,
@@ -84,23 +85,21 @@ impl<'a, O: Coarsen> Fine<'a, O> {
     }
 }
 
-fn inverse_diagonal(operator: &impl Coarsen, held: &Held) -> Vec<[f32; 3]> {
-    let mut diagonal = vec![[0.0; 3]; operator.sites()];
-    operator.diagonal(&mut diagonal);
-    diagonal
-        .par_iter()
-        .zip(&held.0)
-        .map(|(d, &bits)| {
-            std::array::from_fn(|c| {
-                let free = bits & (1 << c) == 0 && d[c] > 0.0;
-                if free { d[c].recip() as f32 } else { 0.0 }
-            })
-        })
-        .collect()
+/// Sites per task of the set-up.
+const CHUNK: usize = 1 << 14;
+
+fn inverse_diagonal(operator: &impl Coarsen, held: &Held) -> Diagonal {
+    let chunks = held
+        .0
+        .par_chunks(CHUNK)
+        .enumerate()
+        .map(|(c, held)| diagonal::chunk(operator, c * CHUNK, held))
+        .collect();
+    Diagonal::from_chunks(chunks)
 }
 
 /// A number for every box that holds a free site.
-fn boxes(positions: &[[f64; 3]], inverse: &[[f32; 3]], box_mm: [f64; 3]) -> Vec<u32> {
+fn boxes(positions: &[[f64; 3]], inverse: &Diagonal, box_mm: [f64; 3]) -> Vec<u32> {
     // Half a site's spacing at least off the boxes' walls on regular grids that begin at zero.
     let index = |x: &[f64; 3]| x.map(|v| v.max(0.0));
     let cells = |x: &[f64; 3]| -> [u64; 3] {
@@ -112,16 +111,20 @@ fn boxes(positions: &[[f64; 3]], inverse: &[[f32; 3]], box_mm: [f64; 3]) -> Vec<
     });
     positions
         .par_iter()
-        .zip(inverse)
-        .map(|(x, d)| {
+        .enumerate()
+        .map(|(i, x)| {
             let c = cells(x);
             let number = (c[2] * (most[1] + 1) + c[1]) * (most[0] + 1) + c[0];
-            if *d == [0.0; 3] { NONE } else { number as u32 }
+            if inverse.free(i) == [0.0; 3] {
+                NONE
+            } else {
+                number as u32
+            }
         })
         .collect()
 }
 
-fn body(members: &[u32], positions: &[[f64; 3]], inverse: &[[f32; 3]]) -> Body {
+fn body(members: &[u32], positions: &[[f64; 3]], inverse: &Diagonal) -> Body {
     let n = members.len() as f64;
     let mut center = [0.0; 3];
     for &i in members {
@@ -147,7 +150,8 @@ fn body(members: &[u32], positions: &[[f64; 3]], inverse: &[[f32; 3]]) -> Body {
         let i = i as usize;
         let d = std::array::from_fn(|c| positions[i][c] - center[c]);
         let carried = rigid::carry(d, radius, radius);
-        for c in (0..3).filter(|&c| inverse[i][c] > 0.0) {
+        let free = inverse.free(i);
+        for c in (0..3).filter(|&c| free[c] > 0.0) {
             rigid::add_gram(&mut gram, &carried[c..c + 1]);
         }
     }
@@ -160,7 +164,7 @@ fn body(members: &[u32], positions: &[[f64; 3]], inverse: &[[f32; 3]]) -> Body {
 
 impl<O: Coarsen> Level<3> for Fine<'_, O> {
     fn sites(&self) -> usize {
-        self.inverse.len()
+        self.inverse.sites()
     }
 
     fn rows(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
@@ -173,8 +177,7 @@ impl<O: Coarsen> Level<3> for Fine<'_, O> {
 
     #[inline]
     fn scale(&self, site: usize, r: &[f32; 3]) -> [f32; 3] {
-        let d = &self.inverse[site];
-        [d[0] * r[0], d[1] * r[1], d[2] * r[2]]
+        self.inverse.times(site, r)
     }
 
     #[inline]
@@ -185,7 +188,7 @@ impl<O: Coarsen> Level<3> for Fine<'_, O> {
     #[inline]
     fn modes(&self, site: usize) -> Modes<3> {
         let [x, y, z] = self.local[site];
-        let free = self.inverse[site].map(|d| if d > 0.0 { 1.0 } else { 0.0 });
+        let free = self.inverse.free(site);
         [
             [free[0], 0.0, 0.0, 0.0, free[0] * z, -free[0] * y, 0.0, 0.0],
             [0.0, free[1], 0.0, -free[1] * z, 0.0, free[1] * x, 0.0, 0.0],

@@ -11,6 +11,7 @@ mod chebyshev;
 mod coarse;
 mod coarsest;
 mod cycle;
+mod diagonal;
 mod fine;
 mod galerkin;
 mod level;

@@ -44,9 +44,9 @@ impl Stencils<f64> {
         }
     }
 
-    /// The block that couples a node to its neighbour `(dx, dy, dz) + 1`, each 0, 1 or 2.
-    pub fn block(&self, around: u8, [dx, dy, dz]: [usize; 3]) -> Block {
-        let (stencil, row) = (self.stencil(around), dy + 3 * dz);
+    /// The block that couples a node to its neighbour at `dx` (0, 1 or 2) in a row of neighbours.
+    fn block(&self, around: u8, row: usize, dx: usize) -> Block {
+        let stencil = self.stencil(around);
         std::array::from_fn(|a| std::array::from_fn(|b| stencil[slot(row, a, 3 * dx + b)] as f32))
     }
 

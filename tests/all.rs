@@ -8,3 +8,4 @@ mod patch;
 mod remodelling;
 mod phantom;
 mod segment;
+mod voxel_fe;

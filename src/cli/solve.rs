@@ -80,6 +80,8 @@ impl SolveSettings {
         params.ends = self.ends.unwrap_or(params.ends);
         params.axis = self.axis.unwrap_or(params.axis);
         params.tolerance = self.tolerance.unwrap_or(params.tolerance);
+        params.refine = self.refine.map_or(params.refine, usize::from);
+        params.coarsen = self.coarsen.map_or(params.coarsen, usize::from);
         self.refuse_unavailable()?;
         params.check()
     }
@@ -87,8 +89,6 @@ impl SolveSettings {
     fn refuse_unavailable(&self) -> Result<()> {
         for (flag, asked) in [
             ("--error", self.error.is_some()),
-            ("--refine", self.refine.is_some()),
-            ("--coarsen", self.coarsen.is_some()),
             ("--fields", !self.fields.is_empty()),
         ] {
             if asked {

@@ -2,5 +2,6 @@
 
 pub mod components;
 pub mod gaussian;
+pub mod resample;
 pub mod threshold;
 pub mod voi;

@@ -10,8 +10,7 @@ use crate::run::segment::load;
 use crate::run::session::Session;
 use crate::solve::cg::CgStep;
 use crate::stage::lattice::{Case, LatticeParams};
-use crate::stage::solve::SolveParams;
-use crate::stage::solve::lattice::{label, solve_lattice};
+use crate::stage::solve::{Method, SolveParams, lattice, voxel_fe};
 use crate::volume::Specimen;
 use indicatif::ProgressBar;
 use std::path::Path;
@@ -24,30 +23,31 @@ use std::path::Path;
 /// the row says so.
 pub fn solve(
     dir: &Path,
-    lattice: &LatticeParams,
+    lattices: &LatticeParams,
     params: &SolveParams,
     session: &Session,
 ) -> Result<Vec<Row>> {
-    lattice.check()?;
+    lattices.check()?;
     params.check()?;
     let specimen = load(dir)?;
-    warn_of_coarse(dir, lattice, session);
+    if params.method == Method::Lattice {
+        warn_of_coarse(dir, lattices, session);
+    }
     let mut results = Results::open(dir, session.force)?;
     let mut rows = Vec::new();
-    for case in lattice.cases() {
-        let blank = blank(&specimen, &case, params);
+    for job in jobs(lattices, params) {
+        let blank = job.label(&specimen, params, params.row(&specimen));
         let row = match results.find(&blank, params) {
             Some(row) => row,
             None if session.dry_run => {
                 session.say(format!(
-                    "would solve {} {} {} mm",
-                    blank.structure,
-                    case.boundary.name(),
-                    case.lp_mm
+                    "would solve {} {} mm",
+                    job.name(&blank),
+                    blank.lp_mm
                 ));
                 continue;
             }
-            None => solve_case(&specimen, &case, params, session)?,
+            None => solve_job(&specimen, &job, &blank, params, session)?,
         };
         session.say(in_words(&row));
         results.keep(&blank, params, &row)?;
@@ -70,28 +70,55 @@ fn warn_of_coarse(dir: &Path, lattice: &LatticeParams, session: &Session) {
     }
 }
 
-/// The row of a solve before it is made: its settings.
-fn blank(specimen: &Specimen, case: &Case, params: &SolveParams) -> Row {
-    label(params.row(specimen), case)
+/// One row to solve.
+enum Job {
+    Lattice(Case),
+    VoxelFe,
 }
 
-fn solve_case(
+fn jobs(lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {
+    match params.method {
+        Method::Lattice => lattices.cases().into_iter().map(Job::Lattice).collect(),
+        Method::VoxelFe => vec![Job::VoxelFe],
+    }
+}
+
+impl Job {
+    /// The columns that tell what was solved.
+    fn label(&self, specimen: &Specimen, params: &SolveParams, row: Row) -> Row {
+        match self {
+            Job::Lattice(case) => lattice::label(row, case),
+            Job::VoxelFe => voxel_fe::label(row, specimen, params),
+        }
+    }
+
+    fn name(&self, row: &Row) -> String {
+        match self {
+            Job::Lattice(case) => format!("{} {}", row.structure, case.boundary.name()),
+            Job::VoxelFe => row.structure.clone(),
+        }
+    }
+}
+
+fn solve_job(
     specimen: &Specimen,
-    case: &Case,
+    job: &Job,
+    blank: &Row,
     params: &SolveParams,
     session: &Session,
 ) -> Result<Row> {
     let meter = Meter::start();
-    let bar = session.bar(1000, &format!("{} {} mm", case.boundary.name(), case.lp_mm));
-    let solved = solve_lattice(specimen, case, params, |step| {
-        show(&bar, step, params.tolerance)
-    })?;
+    let bar = session.bar(1000, &format!("{} {} mm", job.name(blank), blank.lp_mm));
+    let observe = |step| show(&bar, step, params.tolerance);
+    let solved = match job {
+        Job::Lattice(case) => lattice::solve_lattice(specimen, case, params, observe)?,
+        Job::VoxelFe => voxel_fe::solve_voxels(specimen, params, observe)?,
+    };
     bar.finish_and_clear();
-    let row = label(solved.row(params.row(specimen)), case);
     Ok(Row {
         wall_s: Some(meter.wall_s()),
         peak_mib: meter.peak_mib(),
-        ..row
+        ..solved.row(blank.clone())
     })
 }
 

@@ -122,8 +122,8 @@ impl VoxelMesh {
         self.around.par_iter().filter(|&&m| m != 0).count()
     }
 
-    /// The segments that overlap a range of nodes, cut to it, each with the number of nodes cut off its front.
-    pub fn segments_in(&self, nodes: Range<usize>) -> impl Iterator<Item = (Segment, u32)> + '_ {
+    /// The segments that overlap a range of nodes, cut to it.
+    pub fn segments_in(&self, nodes: Range<usize>) -> impl Iterator<Item = Segment> + '_ {
         let first = self
             .segments
             .partition_point(|s| s.nodes().end <= nodes.start);
@@ -138,7 +138,7 @@ impl VoxelMesh {
                 cut.len = end - cut.start;
                 cut.at[0] += skip;
                 cut.rows.iter_mut().for_each(|r| *r += skip);
-                (cut, skip)
+                cut
             })
     }
 

@@ -1,6 +1,7 @@
 //! Owns voxel finite elements: linear elasticity on a mesh of equal 8-node bricks, one modulus for all.
 
 pub mod element;
+pub mod graded;
 mod kernel;
 mod stencils;
 
@@ -61,7 +62,7 @@ impl Coarsen for Hex8 {
 
     fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>) {
         let around = self.mesh.around[site];
-        let Some((segment, _)) = self.mesh.segments_in(site..site + 1).next() else {
+        let Some(segment) = self.mesh.segments_in(site..site + 1).next() else {
             return;
         };
         let neighbours = self.couplings.of(around).iter();
@@ -108,7 +109,7 @@ mod tests {
         for seed in 0..10 {
             let op = random([11, 7, 6], 45, seed);
             let x = vector(op.sites());
-            let exact = by_elements(&op, &x);
+            let exact = by_elements(&op.mesh, &x, |_| 1.0);
             let scale = exact.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
             let mut y = vec![[0.0; 3]; x.len()];
             op.apply(&x, &mut y);
@@ -123,8 +124,39 @@ mod tests {
     }
 
     #[test]
+    fn forces_of_graded_elements_are_those_of_each_times_its_factor() {
+        let op = graded([11, 7, 6], 2);
+        let x = vector(op.sites());
+        let exact = by_elements(op.mesh(), &x, factor);
+        let scale = exact.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+        let mut y = vec![[0.0; 3]; x.len()];
+        op.apply(&x, &mut y);
+        assert!(worst(&exact, &y) < 1e-13 * scale);
+        let x32: Vec<[f32; 3]> = x.iter().map(|v| v.map(|c| c as f32)).collect();
+        let mut y32 = vec![[0.0; 3]; x.len()];
+        op.rows_f32(0..x.len(), &x32, &mut y32);
+        let y: Vec<[f64; 3]> = y32.iter().map(|v| v.map(f64::from)).collect();
+        assert!(worst(&exact, &y) < 3e-6 * scale);
+    }
+
+    #[test]
     fn rows_are_what_the_operator_applies() {
         let op = random([9, 6, 5], 50, 3);
+        check_rows(&op);
+        check_rows(&graded([9, 6, 5], 3));
+    }
+
+    /// Factors that differ from element to element.
+    fn graded(n: [usize; 3], seed: u64) -> graded::Graded {
+        let mesh = random(n, 50, seed).mesh;
+        graded::Graded::new(mesh, 1000.0, 0.3, Integration::Full, factor)
+    }
+
+    fn factor(element: usize) -> f32 {
+        0.25 + (element % 7) as f32
+    }
+
+    fn check_rows(op: &impl Coarsen) {
         let x = vector(op.sites());
         let mut y = vec![[0.0; 3]; x.len()];
         op.apply(&x, &mut y);
@@ -149,8 +181,7 @@ mod tests {
         gaps.fold(0.0, |m, (p, q)| m.max((p - q).abs()))
     }
 
-    fn by_elements(op: &Hex8, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let mesh = &op.mesh;
+    fn by_elements(mesh: &VoxelMesh, x: &[[f64; 3]], f: impl Fn(usize) -> f32) -> Vec<[f64; 3]> {
         let numbers: std::collections::HashMap<[u32; 3], usize> = (0..mesh.len())
             .filter(|&i| mesh.around[i] != 0)
             .map(|i| (mesh.indices(i), i))
@@ -158,16 +189,15 @@ mod tests {
         let k = element::stiffness(mesh.grid.spacing_mm, 1000.0, 0.3, Integration::Full);
         let mut y = vec![[0.0; 3]; x.len()];
         for (node, element) in mesh.low_corner_elements().enumerate() {
-            if element.is_none() {
-                continue;
-            }
+            let Some(element) = element else { continue };
+            let factor = f64::from(f(element));
             let at = mesh.indices(node);
             let corners: [usize; 8] = std::array::from_fn(|c| {
                 numbers[&std::array::from_fn(|a| at[a] + (c >> a & 1) as u32)]
             });
             for i in 0..24 {
                 for j in 0..24 {
-                    y[corners[i / 3]][i % 3] += k[i][j] * x[corners[j / 3]][j % 3];
+                    y[corners[i / 3]][i % 3] += factor * k[i][j] * x[corners[j / 3]][j % 3];
                 }
             }
         }

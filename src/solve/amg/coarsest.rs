@@ -15,6 +15,12 @@ impl Coarsest {
     /// shifted by as little as makes it positive.
     pub fn new(matrix: &BlockMatrix) -> Self {
         let n = 6 * matrix.rows();
+        if n == 0 {
+            return Coarsest {
+                factor: None,
+                scale: Vec::new(),
+            };
+        }
         let mut scale = vec![0.0; n];
         for i in 0..matrix.rows() {
             for (_, block) in matrix.row(i).filter(|(j, _)| *j as usize == i) {

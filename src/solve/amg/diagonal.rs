@@ -1,7 +1,6 @@
 //! Owns the inverse diagonal blocks of the finest level, one number per site: most sites have one of few blocks.
 
 use crate::operator::coarsen::{Block, Coarsen};
-use crate::operator::held::Held;
 use std::collections::HashMap;
 
 /// Symmetric 3 × 3: xx, yy, zz, yz, xz, xy. Zero rows and columns for held components.

@@ -41,10 +41,12 @@ pub struct AmgParams {
 }
 
 impl AmgParams {
-    /// Boxes four sites wide.
+    /// Boxes four sites wide; where the spacing differs by axis, cubes of the same volume, since what is close
+    /// together is what is coupled.
     pub fn new(spacing_mm: [f64; 3]) -> Self {
+        let mean = spacing_mm.iter().product::<f64>().cbrt();
         AmgParams {
-            box_mm: spacing_mm.map(|h| 4.0 * h),
+            box_mm: spacing_mm.map(|h| (4.0 * mean).max(h)),
             degrees: [2, 2],
             coarsest: 200,
         }
@@ -152,6 +154,10 @@ impl<O: Coarsen> Preconditioner<3> for Amg<'_, O> {
             .map(|v| v[0].abs().max(v[1].abs()).max(v[2].abs()))
             .reduce(|| 0.0, f64::max);
         if !(largest > 0.0 && largest.is_finite()) {
+            z.par_iter_mut().for_each(|z| *z = [0.0; 3]);
+            return;
+        }
+        if self.fine.aggregates.count == 0 {
             z.par_iter_mut().for_each(|z| *z = [0.0; 3]);
             return;
         }

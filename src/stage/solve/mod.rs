@@ -2,6 +2,7 @@
 
 pub mod lattice;
 pub mod solved;
+pub mod voxel_fe;
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
@@ -71,6 +72,10 @@ pub struct SolveParams {
     /// Relative algebraic error allowed in the headline modulus (0.001 is 0.1 %).
     pub tolerance: f64,
     pub max_iterations: usize,
+    /// voxel-fe: each voxel becomes this many elements along every axis.
+    pub refine: usize,
+    /// voxel-fe: this many voxels along every axis become one element, bone fractions kept as factors of its modulus.
+    pub coarsen: usize,
 }
 
 impl Default for SolveParams {
@@ -86,6 +91,8 @@ impl Default for SolveParams {
             axis: Axis::Z,
             tolerance: 1e-3,
             max_iterations: 200_000,
+            refine: 1,
+            coarsen: 1,
         }
     }
 }
@@ -133,6 +140,28 @@ impl SolveParams {
                     format!("give {expected}"),
                 ));
             }
+        }
+        for (key, factor) in [
+            ("solve.refine", self.refine),
+            ("solve.coarsen", self.coarsen),
+        ] {
+            if factor == 0 {
+                return Err(Error::setting(
+                    key,
+                    "found 0",
+                    "give 1 or more; 1 is one element per voxel",
+                ));
+            }
+        }
+        if self.refine > 1 && self.coarsen > 1 {
+            return Err(Error::setting(
+                "solve.refine",
+                format!(
+                    "refine {} and coarsen {} exclude each other",
+                    self.refine, self.coarsen
+                ),
+                "set one of them to 1",
+            ));
         }
         if self.max_iterations == 0 {
             return Err(Error::setting(

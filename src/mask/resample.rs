@@ -1,0 +1,97 @@
+//! Owns finer and coarser copies of a mask for voxel finite elements.
+
+use crate::grid::Grid;
+use crate::volume::Volume;
+use rayon::prelude::*;
+
+/// Every voxel split into `factor`³.
+pub fn refine(mask: &Volume<u8>, factor: usize) -> Volume<u8> {
+    let [nx, ny, nz] = mask.grid.n;
+    let n = [nx * factor, ny * factor, nz * factor];
+    let voxels = mask.as_slice();
+    let mut fine = vec![0u8; n.iter().product()];
+    fine.par_chunks_mut(n[0].max(1))
+        .enumerate()
+        .for_each(|(row, out)| {
+            let (y, z) = (row % n[1] / factor, row / n[1] / factor);
+            let source = &voxels[(z * ny + y) * nx..][..nx];
+            for (x, v) in out.iter_mut().enumerate() {
+                *v = source[x / factor];
+            }
+        });
+    let spacing = mask.grid.spacing_mm.map(|h| h / factor as f64);
+    Volume::from_vec(Grid::new(n, spacing), fine)
+}
+
+/// Bone fractions (0 to 1) of voxels `factor` times as long. Where an axis is not a multiple, its voxels are stretched
+/// a little less, so that the box stays what it is; a fine voxel across two coarse ones counts in both by its share.
+pub fn coarsen(mask: &Volume<u8>, factor: usize) -> Volume<f32> {
+    let fine = mask.grid;
+    let n: [usize; 3] = std::array::from_fn(|a| fine.n[a].div_ceil(factor));
+    let shares: [Vec<Vec<(usize, f32)>>; 3] = std::array::from_fn(|a| shares(fine.n[a], n[a]));
+    let voxels = mask.as_slice();
+    let mut coarse = vec![0f32; n.iter().product()];
+    coarse
+        .par_chunks_mut((n[0] * n[1]).max(1))
+        .enumerate()
+        .for_each(|(z, plane)| {
+            for (i, out) in plane.iter_mut().enumerate() {
+                for &(fz, wz) in &shares[2][z] {
+                    for &(fy, wy) in &shares[1][i / n[0]] {
+                        let row = &voxels[(fz * fine.n[1] + fy) * fine.n[0]..][..fine.n[0]];
+                        let across = shares[0][i % n[0]].iter();
+                        let sum: f32 = across.filter(|s| row[s.0] != 0).map(|s| s.1).sum();
+                        *out += wz * wy * sum;
+                    }
+                }
+            }
+        });
+    let size = fine.size_mm();
+    let spacing = std::array::from_fn(|a| size[a] / n[a] as f64);
+    Volume::from_vec(Grid::new(n, spacing), coarse)
+}
+
+/// For each of `coarse` equal intervals, the `fine` ones it covers, with the share of its length that each has.
+fn shares(fine: usize, coarse: usize) -> Vec<Vec<(usize, f32)>> {
+    let ratio = fine as f64 / coarse as f64;
+    (0..coarse)
+        .map(|c| {
+            let (low, high) = (c as f64 * ratio, (c + 1) as f64 * ratio);
+            (low.floor() as usize..fine)
+                .map(|f| {
+                    let covered = high.min(f as f64 + 1.0) - low.max(f as f64);
+                    (f, (covered / ratio) as f32)
+                })
+                .take_while(|s| s.1 > 1e-6)
+                .collect()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> Volume<u8> {
+        let grid = Grid::new([7, 6, 5], [0.01, 0.02, 0.03]);
+        Volume::from_vec(grid, (0..210).map(|i| u8::from(i * i % 7 < 3)).collect())
+    }
+
+    #[test]
+    fn bone_volume_is_kept_both_ways() {
+        let mask = sample();
+        let bone = mask.as_slice().iter().filter(|v| **v != 0).count() as f64;
+        let volume = bone * mask.grid.voxel_mm3();
+        let fine = refine(&mask, 3);
+        let count = fine.as_slice().iter().filter(|v| **v != 0).count() as f64;
+        assert!((count * fine.grid.voxel_mm3() / volume - 1.0).abs() < 1e-12);
+        for factor in [1, 2, 3, 8] {
+            let coarse = coarsen(&mask, factor);
+            let sum: f64 = coarse.as_slice().iter().map(|v| f64::from(*v)).sum();
+            // Shares are single precision.
+            assert!((sum * coarse.grid.voxel_mm3() / volume - 1.0).abs() < 1e-5);
+            let (a, b) = (coarse.grid.size_mm(), mask.grid.size_mm());
+            assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-12));
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Owns the solve by voxel finite elements: one brick per voxel, supports, multigrid, apparent moduli.
+
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::mask::resample;
+use crate::measure::apparent::Loaded;
+use crate::measure::row::Row;
+use crate::operator::coarsen::Coarsen;
+use crate::operator::held::Held;
+use crate::par::sum_chunks;
+use crate::physics::hex8::Hex8;
+use crate::physics::hex8::element::Integration;
+use crate::physics::hex8::graded::Graded;
+use crate::solve::amg::{Amg, AmgParams};
+use crate::solve::cg::{CgInfo, CgParams, CgStep, minimise};
+use crate::stage::solve::solved::{Moduli, Solved};
+use crate::stage::solve::{Ends, Load, SolveParams};
+use crate::topology::voxels::{Planes, VoxelMesh};
+use crate::volume::Specimen;
+
+/// Above this Poisson's ratio the dilatation is averaged over each element: full integration locks as ν → ½.
+pub const LOCKING_POISSON: f64 = 0.4;
+
+/// Bone fraction of a coarsened voxel below which it is no element.
+const LEAST_FRACTION: f32 = 0.02;
+
+/// Solves a specimen with one brick per voxel, or finer or coarser ones.
+///
+/// # Errors
+/// Settings that do not fit the specimen.
+pub fn solve_voxels(
+    specimen: &Specimen,
+    params: &SolveParams,
+    observe: impl FnMut(CgStep),
+) -> Result<Solved> {
+    params.check()?;
+    if params.load == Load::Stiffness {
+        return Err(Error::setting(
+            "load",
+            "the apparent stiffness matrix is not available in this version",
+            "use --load uniaxial or confined, once per axis",
+        ));
+    }
+    let (young, nu) = (params.young_mpa, params.poisson);
+    let rule = if nu > LOCKING_POISSON {
+        Integration::MeanDilatation
+    } else {
+        Integration::Full
+    };
+    if params.coarsen > 1 {
+        let fractions = resample::coarsen(&specimen.bone, params.coarsen);
+        let bone = |f: &f32| *f >= LEAST_FRACTION;
+        let (mesh, grips) = mesh(fractions.grid, fractions.as_slice(), bone, params)?;
+        let values = fractions.as_slice();
+        let model = Graded::new(mesh, young, nu, rule, |e| values[e]);
+        return Ok(solve_model(
+            &model,
+            model.mesh(),
+            grips,
+            specimen,
+            params,
+            observe,
+        ));
+    }
+    let refined = (params.refine > 1).then(|| resample::refine(&specimen.bone, params.refine));
+    let bone = refined.as_ref().unwrap_or(&specimen.bone);
+    let (mesh, grips) = mesh(bone.grid, bone.as_slice(), |b| *b != 0, params)?;
+    drop(refined);
+    let model = Hex8::new(mesh, young, nu, rule);
+    Ok(solve_model(
+        &model,
+        &model.mesh,
+        grips,
+        specimen,
+        params,
+        observe,
+    ))
+}
+
+fn mesh<T: Sync>(
+    grid: Grid,
+    voxels: &[T],
+    is_bone: impl Fn(&T) -> bool + Sync,
+    params: &SolveParams,
+) -> Result<(VoxelMesh, Planes)> {
+    let grips = Planes::within(&grid, params.axis, params.grip_mm)?;
+    Ok((VoxelMesh::new(grid, voxels, is_bone, grips)?, grips))
+}
+
+fn solve_model(
+    model: &impl Coarsen,
+    mesh: &VoxelMesh,
+    grips: Planes,
+    specimen: &Specimen,
+    params: &SolveParams,
+    observe: impl FnMut(CgStep),
+) -> Solved {
+    if mesh.is_empty() {
+        return Solved::disconnected(mesh.dropped);
+    }
+    let axis = params.axis.index();
+    let gauge_mm = (grips.high - grips.low) as f64 * mesh.grid.spacing_mm[axis];
+    let loaded = Loaded {
+        gauge_mm,
+        area_mm2: specimen.area_mm2(params.axis),
+        displacement_mm: params.strain * gauge_mm,
+    };
+    let (held, mut u) = supports(mesh, grips, params, loaded.displacement_mm);
+    let cg = CgParams {
+        energy_tolerance: params.tolerance,
+        max_iterations: params.max_iterations,
+        ..CgParams::default()
+    };
+    let preconditioner = Amg::new(model, &held, &AmgParams::new(mesh.grid.spacing_mm));
+    let info = minimise(model, &held, &preconditioner, &mut u, &cg, observe);
+    drop(preconditioner);
+    Solved {
+        sites: mesh.elements,
+        dropped: mesh.dropped,
+        unknowns: held.free::<3>(),
+        iterations: info.iterations,
+        residual: info.residual,
+        ended: info.ended,
+        moduli: assess(model, mesh, grips, &loaded, &u, &info),
+    }
+}
+
+/// Which unknowns are held, and a start that meets them: the field of a homogeneous bar.
+fn supports(
+    mesh: &VoxelMesh,
+    grips: Planes,
+    params: &SolveParams,
+    displacement_mm: f64,
+) -> (Held, Vec<[f64; 3]>) {
+    let axis = params.axis.index();
+    let mut held = Held::none(mesh.len());
+    let mut u = vec![[0.0; 3]; mesh.len()];
+    for segment in &mesh.segments {
+        for (i, node) in segment.nodes().enumerate() {
+            let at = [
+                segment.at[0] as usize + i,
+                segment.at[1] as usize,
+                segment.at[2] as usize,
+            ];
+            let exists = mesh.around[node] != 0;
+            let gripped = at[axis] <= grips.low || at[axis] >= grips.high;
+            for c in 0..3 {
+                let side = at[c] == 0 || at[c] == mesh.grid.n[c];
+                let confined = params.load == Load::Confined && c != axis && side;
+                let bonded = gripped && (c == axis || params.ends == Ends::Bonded);
+                if confined || bonded || !exists {
+                    held.hold(node, c);
+                }
+            }
+            if exists {
+                u[node][axis] = displacement_mm * along(grips, at[axis]);
+            }
+        }
+    }
+    (held, u)
+}
+
+/// How far a plane lies from the lower grip to the upper: 0 to 1.
+fn along(grips: Planes, plane: usize) -> f64 {
+    (plane.clamp(grips.low, grips.high) - grips.low) as f64 / (grips.high - grips.low) as f64
+}
+
+fn assess(
+    model: &impl Coarsen,
+    mesh: &VoxelMesh,
+    grips: Planes,
+    loaded: &Loaded,
+    u: &[[f64; 3]],
+    info: &CgInfo,
+) -> Moduli {
+    let axis = grips.axis.index();
+    let mut force = vec![[0.0; 3]; mesh.len()];
+    model.apply(u, &mut force);
+    // Σ x_i f_i is the volume integral of the stress, exactly, since positions are a displacement field of the
+    // elements; clamped to the gauge, it is the integral between the innermost gripped planes.
+    let sum = |weight: &(dyn Fn(usize) -> f64 + Sync)| {
+        sum_chunks(mesh.segments.len(), |range| {
+            let part = |s: usize| {
+                let segment = &mesh.segments[s];
+                let nodes = segment.nodes().enumerate();
+                nodes
+                    .map(|(i, node)| {
+                        let x = if axis == 0 { i } else { 0 };
+                        weight(segment.at[axis] as usize + x) * force[node][axis]
+                    })
+                    .sum::<f64>()
+            };
+            range.map(part).sum()
+        })
+    };
+    let reaction = sum(&|plane| if plane >= grips.high { 1.0 } else { 0.0 });
+    let virial = loaded.gauge_mm * sum(&|plane| along(grips, plane));
+    let from_energy_mpa = loaded.from_energy(info.energy);
+    Moduli {
+        e_app_mpa: from_energy_mpa,
+        from_energy_mpa,
+        from_reaction_mpa: loaded.from_reaction(reaction),
+        from_stress_mpa: loaded.from_virial(virial),
+        algebraic_error_mpa: info.energy_error / info.energy * from_energy_mpa,
+    }
+}
+
+/// The columns that tell that a row is of voxel elements, and of which size (the mean edge where edges differ).
+pub fn label(row: Row, specimen: &Specimen, params: &SolveParams) -> Row {
+    let [x, y, z] = specimen.bone.grid.spacing_mm;
+    let edge = if x == y && y == z {
+        x
+    } else {
+        (x * y * z).cbrt()
+    };
+    Row {
+        method: "voxel-fe".into(),
+        structure: "hex8".into(),
+        boundary: None,
+        lp_mm: edge * params.coarsen as f64 / params.refine as f64,
+        registration: None,
+        ..row
+    }
+}

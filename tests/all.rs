@@ -5,7 +5,7 @@ mod cohort;
 mod laws;
 mod layers;
 mod patch;
-mod remodelling;
 mod phantom;
+mod remodelling;
 mod segment;
 mod voxel_fe;

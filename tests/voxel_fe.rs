@@ -59,7 +59,6 @@ fn a_solid_bar_has_the_modulus_of_its_tissue() {
     // Off to first order in the algebraic error: the root of the energy's 1e-9. Measured: 3e-7.
     for e in [m.from_reaction_mpa, m.from_stress_mpa] {
         assert!((e / 1000.0 - 1.0).abs() < 3e-5, "{e}");
-    }");
     }
 }
 

@@ -78,7 +78,7 @@ impl<'a, O: Coarsen> Fine<'a, O> {
     }
 
     /// Amplitudes of orthonormal motions to those of plain ones.
-    pub fn from_basis(&self, e: &[Six], raw: &mut [Six]) {
+    pub fn to_plain(&self, e: &[Six], raw: &mut [Six]) {
         for ((e, raw), basis) in e.iter().zip(raw).zip(&self.bases) {
             *raw = std::array::from_fn(|m| (0..6).map(|k| basis[m][k] * e[k]).sum());
         }

@@ -5,6 +5,9 @@
 //! prolongator; the coarser ones are assembled, each coarsened by its own graph. All of it is in single precision:
 //! it only has to be a good guess.
 
+// Small fixed matrices read best by index.
+#![allow(clippy::needless_range_loop)]
+
 mod aggregate;
 mod blocks;
 mod chebyshev;
@@ -178,7 +181,7 @@ impl<O: Coarsen> Preconditioner<3> for Amg<'_, O> {
                 collect(&mut raw);
                 self.fine.to_basis(&raw, &mut coarse[0].b);
                 self.coarse_cycle(0, coarse);
-                self.fine.from_basis(&coarse[0].x, &mut raw);
+                self.fine.to_plain(&coarse[0].x, &mut raw);
                 prolong(&raw);
             },
         );

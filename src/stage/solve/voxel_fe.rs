@@ -144,8 +144,8 @@ fn supports(
             ];
             let exists = mesh.around[node] != 0;
             let gripped = at[axis] <= grips.low || at[axis] >= grips.high;
-            for c in 0..3 {
-                let side = at[c] == 0 || at[c] == mesh.grid.n[c];
+            for (c, &plane) in at.iter().enumerate() {
+                let side = plane == 0 || plane == mesh.grid.n[c];
                 let confined = params.load == Load::Confined && c != axis && side;
                 let bonded = gripped && (c == axis || params.ends == Ends::Bonded);
                 if confined || bonded || !exists {

@@ -5,8 +5,9 @@ use crate::operator::sparse::Sparse;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::solvers::SolveCore;
 use faer::perm::PermRef;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
@@ -109,6 +110,45 @@ impl DirectLlt {
         Ok(())
     }
 
+    /// The factor's lower right corner: the Cholesky factor of the Schur complement of the `count` rows eliminated
+    /// last, dense, column by column (zeros above its diagonal).
+    ///
+    /// # Panics
+    /// Before the first [`DirectLlt::factorize`].
+    pub fn corner(&self, count: usize) -> Vec<f64> {
+        let n = self.symbolic.nrows();
+        let first = n - count;
+        let mut corner = vec![0.0; count * count];
+        let mut put = |row: usize, column: usize, value: f64| {
+            if column >= first && row >= column {
+                corner[(column - first) * count + row - first] = value;
+            }
+        };
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(symbolic) => {
+                let factor = SupernodalLltRef::new(symbolic, &self.numeric[..]);
+                for s in 0..symbolic.n_supernodes() {
+                    let (node, end) = (factor.supernode(s), symbolic.supernode_end()[s] as usize);
+                    for j in first.max(node.start())..end.max(first) {
+                        let column = node.val().col(j - node.start());
+                        let size = end - node.start();
+                        (0..size).for_each(|i| put(node.start() + i, j, column[i]));
+                        let pattern = node.pattern().iter().enumerate();
+                        pattern.for_each(|(i, &row)| put(row as usize, j, column[size + i]));
+                    }
+                }
+            }
+            SymbolicCholeskyRaw::Simplicial(symbolic) => {
+                let (start, rows) = (symbolic.col_ptr(), symbolic.row_idx());
+                for j in first..n {
+                    let range = start[j] as usize..start[j + 1] as usize;
+                    range.for_each(|k| put(rows[k] as usize, j, self.numeric[k]));
+                }
+            }
+        }
+        corner
+    }
+
     /// `A x = b` in place.
     ///
     /// # Panics
@@ -192,5 +232,35 @@ mod tests {
         let mut x = b.clone();
         llt.solve(&mut x);
         assert!(residual(&symmetric, &x, &b) < 1e-13);
+    }
+
+    /// The corner's product is the Schur complement: A_ww - A_wf A_ff⁻¹ A_fw, whose inverse is a block of A⁻¹.
+    #[test]
+    fn the_corner_is_the_factor_of_the_schur_complement() {
+        for m in [5, 30] {
+            let a = grid(m, 0.0);
+            let n = m * m;
+            let positions: Vec<[f64; 2]> =
+                (0..n).map(|i| [(i % m) as f64, (i / m) as f64]).collect();
+            let order = nested_dissection(&positions, 1.0);
+            let mut llt = DirectLlt::new(&a, &order).unwrap();
+            llt.factorize(&a).unwrap();
+            let w = 7;
+            let l = llt.corner(w);
+            for column in 0..w {
+                let mut x = vec![0.0; n];
+                x[order[n - w + column]] = 1.0;
+                llt.solve(&mut x);
+                // L Lᵀ applied to the block's column of the inverse is a unit vector.
+                let part: Vec<f64> = (0..w).map(|i| x[order[n - w + i]]).collect();
+                let half: Vec<f64> = (0..w)
+                    .map(|j| (j..w).map(|i| l[j * w + i] * part[i]).sum())
+                    .collect();
+                for i in 0..w {
+                    let found: f64 = (0..=i).map(|j| l[j * w + i] * half[j]).sum();
+                    assert!((found - f64::from(u8::from(i == column))).abs() < 1e-12);
+                }
+            }
+        }
     }
 }

@@ -7,3 +7,5 @@ pub mod direct;
 pub mod estimate;
 pub mod jacobi;
 pub mod newton;
+pub mod lanczos;
+pub mod zone;

@@ -3,6 +3,8 @@
 
 use super::bond::Blocks;
 use crate::operator::Operator;
+use crate::operator::reduction::Reduction;
+use crate::operator::sparse::Sparse;
 use crate::topology::family::Family;
 use rayon::prelude::*;
 
@@ -78,6 +80,41 @@ impl<const D: usize> Body<D> {
             let (q, kind) = self.family.kind(slot);
             (q, kind, self.factor(slot))
         })
+    }
+
+    /// Tᵀ A T in compressed rows, the lower triangle only (what a factorisation reads). `extra` is added to the
+    /// diagonal of each value; empty: nothing.
+    pub fn assemble(&self, reduction: &Reduction, extra: &[f64]) -> Sparse {
+        let site = |q: usize| (reduction.equation(q) / D, reduction.equation(q) % D);
+        let below = |q: usize, value: usize| reduction.unknown(value).filter(|&c| c <= q);
+        let mut a = Sparse::from_pattern(reduction.unknowns(), |q, list| {
+            let (p, _) = site(q);
+            let points = self.row(p).map(|(other, _, _)| other).chain([p]);
+            let values = points.flat_map(|point| (0..D).map(move |d| point * D + d));
+            list.extend(values.filter_map(|value| below(q, value)).map(|c| c as u32));
+        });
+        a.fill(|rows| {
+            for q in rows.range() {
+                let (p, i) = site(q);
+                let mut own = [0.0; D];
+                for (other, kind, factor) in self.row(p) {
+                    let b = &self.blocks[kind];
+                    for d in 0..D {
+                        own[d] += factor * b.own[i][d];
+                        if let Some(c) = below(q, other * D + d) {
+                            rows.add(q, c, factor * b.cross[i][d]);
+                        }
+                    }
+                }
+                for (d, value) in own.into_iter().enumerate() {
+                    if let Some(c) = below(q, p * D + d) {
+                        rows.add(q, c, value);
+                    }
+                }
+                rows.add(q, q, extra.get(p * D + i).copied().unwrap_or(0.0));
+            }
+        });
+        a
     }
 
     /// Σ over bonds: x·A x/2, the energy per mm of thickness.

@@ -2,6 +2,7 @@
 
 pub mod lattice;
 pub mod phantom;
+pub mod molecular;
 pub mod report;
 pub mod scene;
 pub mod segment;

@@ -79,6 +79,8 @@ pub enum Physics {
     BondBased(BondBasedParams),
     /// Its local twin by finite elements.
     Continuum(ContinuumParams),
+    /// Anisotropic elasticity, fracture, conduction.
+    ContinuumMolecular(Box<crate::stage::molecular::Molecular>),
 }
 
 /// What the scene's files hold, read by the caller.
@@ -88,6 +90,8 @@ pub struct Inputs {
     pub bitmap: Option<Bitmap>,
     /// A value per cell of the bitmap (grey values of a scan), rows from the bottom up.
     pub grey: Option<Vec<f64>>,
+    /// An apparent stiffness in MPa, Voigt order 11, 22, 33, 23, 13, 12.
+    pub stiffness: Option<[[f64; 6]; 6]>,
 }
 
 impl Scene {
@@ -145,6 +149,9 @@ pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Resul
     match &scene.physics {
         Physics::BondBased(params) => bond_based::run(scene, params, inputs, observer),
         Physics::Continuum(params) => continuum::run(scene, params, inputs, observer),
+        Physics::ContinuumMolecular(model) => {
+            crate::stage::molecular::run(scene, model, inputs, observer)
+        }
     }
 }
 

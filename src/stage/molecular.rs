@@ -1,0 +1,312 @@
+//! Owns continuum-molecular scenes: which physics a scene has, and which solution that asks for. Lengths in mm, forces
+//! in N, moduli in MPa, or any consistent units.
+
+pub mod fracture;
+pub mod modes;
+pub mod setup;
+pub mod steady;
+pub mod sweep;
+pub mod window;
+
+use crate::error::{Error, Result};
+use crate::physics::anisotropic::conductivity::Conductivity;
+use crate::physics::anisotropic::tensor::{Plane, PlaneTensor};
+use crate::physics::anisotropic::tetrachiral::Tetrachiral;
+use crate::stage::scene::conditions::Region;
+use crate::stage::scene::frame::{Observer, Summary};
+use crate::stage::scene::{Inputs, Scene};
+use serde::{Deserialize, Serialize};
+
+/// The table `[physics.continuum-molecular]`. A physics that is left out costs nothing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Molecular {
+    #[serde(default)]
+    pub elasticity: Option<Elasticity>,
+    #[serde(default)]
+    pub conduction: Option<Conduction>,
+    #[serde(default)]
+    pub fracture: Option<Fracture>,
+    #[serde(default)]
+    pub vibration: Option<Vibration>,
+    /// Segments `[x0, y0, x1, y1]` that cut the bonds they cross: pre-cracks, slits.
+    #[serde(default)]
+    pub cracks: Vec<[f64; 4]>,
+    /// Regions held at a known field, for boundary layers.
+    #[serde(default)]
+    pub known: Vec<Known>,
+    /// Out-of-plane thickness; loads and energies are in proportion.
+    #[serde(default = "one")]
+    pub thickness: f64,
+    /// The volume method for surfaces: bonds of incomplete families are stiffened by 2 V0/(Vp + Vq).
+    #[serde(default = "yes")]
+    pub correct_surfaces: bool,
+    /// Run once for each of several values of one parameter.
+    #[serde(default)]
+    pub sweep: Option<sweep::Sweep>,
+}
+
+/// Plane elasticity: exactly one of `moduli`, `young` with `poisson`, `tetrachiral`, `from_scan`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub struct Elasticity {
+    /// C1111, C2222, C1122, C1212, C1112, C2212 in the material's axes.
+    pub moduli: Option<[f64; 6]>,
+    pub young: Option<f64>,
+    pub poisson: Option<f64>,
+    pub tetrachiral: Option<TetrachiralParams>,
+    /// A 6 x 6 apparent stiffness cut to a plane.
+    pub from_scan: Option<FromScan>,
+    pub plane: Plane,
+    /// Angle of the material's first axis.
+    pub angle_deg: f64,
+    pub bending: Option<Bending>,
+    pub thermal: Option<Thermal>,
+}
+
+/// The tetrachiral block lattice of eqs. 86-90.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TetrachiralParams {
+    pub block: f64,
+    pub chirality_deg: f64,
+    pub interface: f64,
+    pub young: f64,
+    pub poisson: f64,
+}
+
+/// Where a 6 x 6 stiffness (MPa, Voigt order 11, 22, 33, 23, 13, 12) is read from, and which of its axes span the plane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FromScan {
+    /// JSON file, relative to the scene file: the matrix itself, or an object with it under `stiffness_mpa`.
+    pub file: std::path::PathBuf,
+    /// For instance `[\"x\", \"z\"]`: the scan's axes that become the scene's first and second.
+    pub axes: [crate::grid::Axis; 2],
+}
+
+/// Couple-stress moduli E3131 and E3232 (N), eqs. 177-181 for any even exponent.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bending {
+    pub first: f64,
+    pub second: f64,
+    #[serde(default = "two")]
+    pub exponent: u32,
+}
+
+/// Thermal strain (eq. 176): expansion a11, a22, a12 per degree, temperature rise `[T0, dT/dx, dT/dy]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Thermal {
+    pub expansion: [f64; 3],
+    pub rise: [f64; 3],
+}
+
+/// Heat or electric conduction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Conduction {
+    /// K11, K22, K12 in the material's axes.
+    pub conductivity: [f64; 3],
+    #[serde(default)]
+    pub angle_deg: f64,
+    /// Even exponent of the angular law (eq. 163).
+    #[serde(default = "two")]
+    pub exponent: u32,
+    /// Make the stencil conduct a linear field exactly.
+    #[serde(default)]
+    pub calibrated: bool,
+    /// Heat capacity per volume; with `time`, the scene is transient.
+    #[serde(default)]
+    pub capacity: Option<f64>,
+    #[serde(default)]
+    pub initial: f64,
+    /// Two positions whose potential difference is recorded.
+    #[serde(default)]
+    pub probes: Option<[[f64; 2]; 2]>,
+}
+
+/// Brittle fracture by the energy criterion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fracture {
+    /// Fracture energy (N/mm) of cracks normal to the material's first axis and to its second; with frequency 2 to the
+    /// direction at 45 degrees.
+    pub energy: [f64; 2],
+    #[serde(default = "two")]
+    pub exponent: u32,
+    #[serde(default = "first")]
+    pub frequency: u32,
+    /// Bonds break in extension only.
+    #[serde(default = "yes")]
+    pub extension_only: bool,
+    /// At one load the bonds whose energy ratio is within this share of the largest break together.
+    #[serde(default = "tenth")]
+    pub batch: f64,
+    /// Stop when a bond centred here breaks.
+    #[serde(default)]
+    pub stop: Option<Region>,
+    /// Where a bond never breaks.
+    #[serde(default)]
+    pub unbreakable: Vec<Region>,
+    /// The crack's length is measured from here.
+    #[serde(default)]
+    pub tip: [f64; 2],
+    /// Points of the dense remainder about the crack front.
+    #[serde(default = "window")]
+    pub window_points: usize,
+}
+
+/// Natural vibration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vibration {
+    pub density: f64,
+    pub modes: usize,
+}
+
+/// A region held at a known field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Known {
+    pub region: Region,
+    pub field: KnownField,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum KnownField {
+    /// Displacement and rotation about a crack tip at the origin, the crack along negative x: K_I and K_II.
+    CrackTip([f64; 2]),
+    /// The affine field of ε11, ε22, 2 ε12, without rotation.
+    Strain([f64; 3]),
+    /// Temperature or potential Σ c xᵃ yᵇ, as rows `[a, b, c]`.
+    Polynomial(Vec<[f64; 3]>),
+}
+
+fn one() -> f64 {
+    1.0
+}
+fn tenth() -> f64 {
+    0.1
+}
+fn yes() -> bool {
+    true
+}
+fn two() -> u32 {
+    2
+}
+fn first() -> u32 {
+    1
+}
+fn window() -> usize {
+    800
+}
+
+impl Elasticity {
+    /// The stiffness in the scene's axes.
+    pub fn tensor(&self, inputs: &Inputs) -> Result<PlaneTensor> {
+        let zeta = self.angle_deg.to_radians();
+        let tensor = match (&self.moduli, self.young, &self.tetrachiral, &self.from_scan) {
+            (Some(moduli), None, None, None) => PlaneTensor::from_moduli(*moduli)?,
+            (None, Some(young), None, None) => {
+                PlaneTensor::isotropic(young, self.poisson.unwrap_or(0.0), self.plane)?
+            }
+            (None, None, Some(t), None) => t.lattice().tensor()?,
+            (None, None, None, Some(scan)) => {
+                let six = inputs.stiffness.as_ref().ok_or_else(|| {
+                    Error::setting(
+                        "elasticity.from_scan.file",
+                        "the stiffness was not read",
+                        "check its path",
+                    )
+                })?;
+                PlaneTensor::cut(six, scan.axes.map(|a| a.index()), self.plane)?
+            }
+            _ => {
+                return Err(Error::setting(
+                    "elasticity",
+                    "expected exactly one of moduli, young (with poisson), tetrachiral, from_scan",
+                    "keep one",
+                ));
+            }
+        };
+        Ok(tensor.turned(zeta))
+    }
+}
+
+impl TetrachiralParams {
+    fn lattice(&self) -> Tetrachiral {
+        Tetrachiral {
+            block_mm: self.block,
+            chirality: self.chirality_deg.to_radians(),
+            interface_mm: self.interface,
+            young_mpa: self.young,
+            poisson: self.poisson,
+        }
+    }
+}
+
+impl Conduction {
+    /// The conductivity in the scene's axes.
+    pub fn tensor(&self) -> Result<Conductivity> {
+        let [k11, k22, k12] = self.conductivity;
+        let (major, minor, axis) = Conductivity::new(k11, k22, k12)?.axes();
+        Conductivity::principal(major, minor, axis + self.angle_deg.to_radians())
+    }
+}
+
+/// Runs a continuum-molecular scene.
+pub fn run(
+    scene: &Scene,
+    model: &Molecular,
+    inputs: &Inputs,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    if let Some(sweep) = &model.sweep {
+        return sweep::run(scene, model, sweep, inputs, observer);
+    }
+    let setup = setup::Setup::new(scene, model, inputs)?;
+    let Some(elasticity) = &model.elasticity else {
+        let Some(conduction) = &model.conduction else {
+            return Err(Error::setting(
+                "physics.continuum-molecular",
+                "found neither elasticity nor conduction",
+                "add the table of at least one",
+            ));
+        };
+        return steady::conduct(scene, model, conduction, &setup, observer);
+    };
+    let tensor = elasticity.tensor(inputs)?;
+    let micro = setup.micromoduli(&tensor);
+    for negative in micro.negative() {
+        observer.say(&format!(
+            "micromodulus {} is negative, {:.3} of the largest k_n at {:.0} degrees: the pair potential is not convex \
+             there and cracks may be unstable",
+            negative.name, negative.relative_minimum, negative.direction_deg
+        ));
+    }
+    // Without shear and bending micromoduli there is nothing to turn: two unknowns per point.
+    if micro.is_central() && elasticity.bending.is_none() {
+        elastic::<2>(scene, model, elasticity, &tensor, &setup, observer)
+    } else {
+        elastic::<3>(scene, model, elasticity, &tensor, &setup, observer)
+    }
+}
+
+fn elastic<const D: usize>(
+    scene: &Scene,
+    model: &Molecular,
+    elasticity: &Elasticity,
+    tensor: &PlaneTensor,
+    setup: &setup::Setup,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    let solid = setup::Solid::<D>::new(scene, model, elasticity, tensor, setup)?;
+    match (&model.vibration, &model.fracture) {
+        (Some(vibration), _) => modes::run(solid, vibration, setup, observer),
+        (None, Some(fracture)) => fracture::run(scene, model, fracture, solid, setup, observer),
+        (None, None) => steady::deform(scene, model, elasticity, tensor, solid, setup, observer),
+    }
+}

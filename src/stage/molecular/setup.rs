@@ -1,0 +1,372 @@
+//! Owns what all solutions of a continuum-molecular scene start from: points, families, bodies, what is held.
+
+use super::{Conduction, Elasticity, KnownField, Molecular};
+use crate::error::{Error, Result};
+use crate::operator::Operator;
+use crate::operator::reduction::{Reduction, Value};
+use crate::physics::anisotropic::body::Body;
+use crate::physics::anisotropic::bond::{Bond, Moduli, bonds};
+use crate::physics::anisotropic::conductivity::calibration;
+use crate::physics::anisotropic::cosine::CosineLaw;
+use crate::physics::anisotropic::crack_tip::CrackTip;
+use crate::physics::anisotropic::micromoduli::Micromoduli;
+use crate::physics::anisotropic::tensor::PlaneTensor;
+use crate::solve::direct::DirectLlt;
+use crate::stage::scene::{Inputs, Scene};
+use crate::topology::dissection::nested_dissection;
+use crate::topology::family::Family;
+use crate::topology::plane::Points;
+
+/// Points, their families without the bonds that cracks cut, and the bonds of a full family.
+pub struct Setup {
+    pub points: Points,
+    pub family: Family,
+    pub bonds: Vec<Bond>,
+    /// Volume of a cell per unit thickness.
+    pub cell: f64,
+    /// Points of boundary layers, whose families count as full.
+    layer: Vec<bool>,
+}
+
+impl Setup {
+    pub fn new(scene: &Scene, model: &Molecular, inputs: &Inputs) -> Result<Self> {
+        if model.thickness.is_nan() || model.thickness <= 0.0 {
+            return Err(Error::setting(
+                "thickness",
+                format!("found {}", model.thickness),
+                "give a positive length",
+            ));
+        }
+        let points = scene.points(inputs)?;
+        let stencil = scene.stencil()?;
+        let all = bonds(&stencil);
+        let cell = stencil.spacing * stencil.spacing;
+        let mut family = Family::new(&points, points.len(), stencil);
+        if !model.cracks.is_empty() {
+            family.retain(|i, j| {
+                let (a, b) = (points.position(i), points.position(j));
+                !model.cracks.iter().any(|crack| crosses(crack, a, b))
+            });
+        }
+        let mut layer = vec![false; points.len()];
+        for known in &model.known {
+            let chosen = known.region.select(&points, points.len(), "known.region")?;
+            chosen.into_iter().for_each(|p| layer[p] = true);
+        }
+        Ok(Setup {
+            points,
+            family,
+            bonds: all,
+            cell,
+            layer,
+        })
+    }
+
+    pub fn horizon(&self) -> f64 {
+        self.family.stencil.horizon
+    }
+
+    pub fn micromoduli(&self, tensor: &PlaneTensor) -> Micromoduli {
+        Micromoduli::new(tensor, self.horizon())
+    }
+
+    /// Bonds of the body, each once.
+    pub fn bond_count(&self) -> usize {
+        self.family.len() / 2
+    }
+
+    fn finish<const D: usize>(&self, model: &Molecular, mut body: Body<D>) -> Body<D> {
+        if model.correct_surfaces {
+            body.correct_surfaces(|p| self.layer[p]);
+        }
+        body
+    }
+
+    /// The conducting body.
+    pub fn conductor(
+        &self,
+        model: &Molecular,
+        conduction: &Conduction,
+    ) -> Result<(Body<1>, Vec<f64>)> {
+        let tensor = conduction.tensor()?;
+        let law = tensor.microconductivity(self.horizon(), conduction.exponent)?;
+        let mut k: Vec<f64> = self.bonds.iter().map(|b| law.at(b.psi())).collect();
+        if conduction.calibrated {
+            let c = calibration(&self.bonds, &k, &tensor)?;
+            k.iter_mut()
+                .zip(&self.bonds)
+                .for_each(|(k, b)| *k *= b.second_harmonic(c));
+        }
+        let blocks = self
+            .bonds
+            .iter()
+            .zip(&k)
+            .map(|(b, k)| b.conductance(*k, self.cell))
+            .collect();
+        Ok((
+            self.finish(model, Body::new(self.family.clone(), blocks)),
+            k,
+        ))
+    }
+
+    /// Values held by `hold` and `known`, at time `t`; `names` are the components.
+    pub fn held<const D: usize>(
+        &self,
+        scene: &Scene,
+        model: &Molecular,
+        names: [&[&str]; D],
+        t: f64,
+        tip: Option<&CrackTip>,
+    ) -> Result<Vec<Option<f64>>> {
+        let mut held = vec![None; self.points.len() * D];
+        for hold in &scene.hold {
+            hold.value.check("hold.value")?;
+            let Some(d) = names
+                .iter()
+                .position(|n| n.contains(&hold.component.as_str()))
+            else {
+                if ["x", "y", "rotation", "temperature", "potential"]
+                    .contains(&hold.component.as_str())
+                {
+                    continue;
+                }
+                return Err(Error::setting(
+                    "hold.component",
+                    format!("`{}` is not a component of this scene", hold.component),
+                    "use x, y, rotation (elasticity), temperature or potential (conduction)",
+                ));
+            };
+            for p in hold
+                .region
+                .select(&self.points, self.points.len(), "hold.region")?
+            {
+                held[p * D + d] = Some(hold.value.at(t));
+            }
+        }
+        for known in &model.known {
+            for p in known
+                .region
+                .select(&self.points, self.points.len(), "known.region")?
+            {
+                let x = self.points.position(p);
+                let values = known_values::<D>(&known.field, x, tip);
+                for (d, value) in values.into_iter().enumerate() {
+                    if let Some(value) = value {
+                        held[p * D + d] = Some(value);
+                    }
+                }
+            }
+        }
+        Ok(held)
+    }
+}
+
+/// What a known field prescribes at `x`, by component.
+fn known_values<const D: usize>(
+    field: &KnownField,
+    x: [f64; 2],
+    tip: Option<&CrackTip>,
+) -> [Option<f64>; D] {
+    let mut values = [None; D];
+    let mut put = |given: &[f64]| {
+        values
+            .iter_mut()
+            .zip(given)
+            .for_each(|(v, g)| *v = Some(*g));
+    };
+    match (field, tip) {
+        (KnownField::CrackTip(k), Some(tip)) if D > 1 => {
+            let [u, v] = tip.displacement(x, *k);
+            put(&[u, v, tip.rotation(x, *k)]);
+        }
+        (KnownField::Strain([e11, e22, shear]), _) if D > 1 => {
+            put(&[
+                e11 * x[0] + 0.5 * shear * x[1],
+                0.5 * shear * x[0] + e22 * x[1],
+                0.0,
+            ]);
+        }
+        (KnownField::Polynomial(terms), _) if D == 1 => {
+            put(&[terms
+                .iter()
+                .map(|[a, b, c]| c * x[0].powf(*a) * x[1].powf(*b))
+                .sum()]);
+        }
+        _ => {}
+    }
+    values
+}
+
+/// Whether the bond from `a` to `b` meets the segment.
+fn crosses(segment: &[f64; 4], a: [f64; 2], b: [f64; 2]) -> bool {
+    let (c, d) = ([segment[0], segment[1]], [segment[2], segment[3]]);
+    let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
+        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+    };
+    side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
+
+/// An elastic body and what is held of it at time 1 or at the end.
+pub struct Solid<const D: usize> {
+    pub body: Body<D>,
+    /// Of each bond of the stencil.
+    pub moduli: Vec<Moduli>,
+    pub held: Vec<Option<f64>>,
+}
+
+pub const DISPLACEMENT: [&[&str]; 3] = [&["x"], &["y"], &["rotation"]];
+
+impl<const D: usize> Solid<D> {
+    pub fn new(
+        scene: &Scene,
+        model: &Molecular,
+        elasticity: &Elasticity,
+        tensor: &PlaneTensor,
+        setup: &Setup,
+    ) -> Result<Self> {
+        let micro = setup.micromoduli(tensor);
+        let bending = match &elasticity.bending {
+            Some(b) => {
+                // E = (δ³/6) ∫ k_b n nᵀ dψ, of which eqs. 180, 181 are the case n = 2.
+                let scale = 6.0 / setup.horizon().powi(3);
+                let zeta = elasticity.angle_deg.to_radians();
+                Some(CosineLaw::of_second_moment(
+                    scale * b.first,
+                    scale * b.second,
+                    b.exponent,
+                    zeta,
+                )?)
+            }
+            None => None,
+        };
+        let law = |b: &Bond| Moduli {
+            axial: micro.axial(b.psi()),
+            shear: if D == 2 { 0.0 } else { micro.shear(b.psi()) },
+            bending: bending.as_ref().map_or(0.0, |k| k.at(b.psi())),
+        };
+        let moduli: Vec<Moduli> = setup.bonds.iter().map(law).collect();
+        let blocks = setup
+            .bonds
+            .iter()
+            .zip(&moduli)
+            .map(|(b, k)| b.stiffness(k, setup.cell))
+            .collect();
+        let body = setup.finish(model, Body::new(setup.family.clone(), blocks));
+        let names: [&[&str]; D] = std::array::from_fn(|d| DISPLACEMENT[d]);
+        let t = scene.time.as_ref().map_or(1.0, |time| time.end);
+        let tip = CrackTip::new(tensor);
+        let held = setup.held(scene, model, names, t, Some(&tip))?;
+        Ok(Solid { body, moduli, held })
+    }
+}
+
+/// A factorised body: which of its values are unknowns, and the factor.
+pub struct Factorised {
+    pub reduction: Reduction,
+    pub llt: DirectLlt,
+    /// Unknowns in order of elimination.
+    pub order: Vec<usize>,
+}
+
+/// Factorises Tᵀ(A + diag)T. Points in `last` (all of whose values are free) are eliminated last, in that order.
+pub fn factorise<const D: usize>(
+    body: &Body<D>,
+    points: &Points,
+    held: &[Option<f64>],
+    extra: &[f64],
+    last: &[usize],
+) -> Result<Factorised> {
+    let values: Vec<Value> = held
+        .iter()
+        .map(|h| {
+            if h.is_some() {
+                Value::Held
+            } else {
+                Value::Free
+            }
+        })
+        .collect();
+    let reduction = Reduction::new(&values);
+    let mut kept = vec![false; points.len()];
+    last.iter().for_each(|&p| kept[p] = true);
+    let free = |p: &usize| !kept[*p] && (0..D).any(|d| held[p * D + d].is_none());
+    let dissected: Vec<usize> = (0..points.len()).filter(free).collect();
+    let positions: Vec<[f64; 2]> = dissected.iter().map(|&p| points.position(p)).collect();
+    let width = f64::from(body.family.stencil.reach()) * points.spacing;
+    let order = nested_dissection(&positions, width);
+    let sites = order
+        .iter()
+        .map(|&k| dissected[k])
+        .chain(last.iter().copied());
+    let order: Vec<usize> = sites
+        .flat_map(|p| (0..D).map(move |d| p * D + d))
+        .filter_map(|value| reduction.unknown(value))
+        .collect();
+    let a = body.assemble(&reduction, extra);
+    let mut llt = DirectLlt::new(&a, &order)?;
+    llt.factorize(&a)?;
+    Ok(Factorised {
+        reduction,
+        llt,
+        order,
+    })
+}
+
+impl Factorised {
+    /// Tᵀ r for a force `r` on all values.
+    pub fn restrict<const D: usize>(&self, r: &[[f64; D]]) -> Vec<f64> {
+        (0..self.reduction.unknowns())
+            .map(|q| self.reduction.equation(q))
+            .map(|v| r[v / D][v % D])
+            .collect()
+    }
+
+    /// All values from the unknowns and what is held.
+    pub fn expand<const D: usize>(&self, q: &[f64], held: &[Option<f64>]) -> Vec<[f64; D]> {
+        let value =
+            |v: usize| held[v].unwrap_or_else(|| self.reduction.unknown(v).map_or(0.0, |k| q[k]));
+        (0..held.len() / D)
+            .map(|p| std::array::from_fn(|d| value(p * D + d)))
+            .collect()
+    }
+}
+
+/// Values of the held ones, zero elsewhere.
+pub fn lift<const D: usize>(held: &[Option<f64>]) -> Vec<[f64; D]> {
+    (0..held.len() / D)
+        .map(|p| std::array::from_fn(|d| held[p * D + d].unwrap_or(0.0)))
+        .collect()
+}
+
+/// Tᵀ(f - A g): the right-hand side for the unknowns.
+pub fn right_hand_side<const D: usize>(
+    body: &Body<D>,
+    factorised: &Factorised,
+    held: &[Option<f64>],
+    force: &[[f64; D]],
+) -> Vec<f64> {
+    let mut r = vec![[0.0; D]; body.sites()];
+    body.apply(&lift(held), &mut r);
+    for (p, r) in r.iter_mut().enumerate() {
+        for (d, r) in r.iter_mut().enumerate() {
+            *r = force.get(p).map_or(0.0, |f| f[d]) - *r;
+        }
+    }
+    factorised.restrict(&r)
+}
+
+/// Equilibrium of A x = f with the held values. Returns all values and the number of unknowns.
+pub fn solve<const D: usize>(
+    body: &Body<D>,
+    points: &Points,
+    held: &[Option<f64>],
+    force: &[[f64; D]],
+) -> Result<(Vec<[f64; D]>, usize)> {
+    if held.iter().all(|h| h.is_some()) {
+        return Ok((lift(held), 0));
+    }
+    let mut factorised = factorise(body, points, held, &[], &[])?;
+    let mut q = right_hand_side(body, &factorised, held, force);
+    factorised.llt.solve(&mut q);
+    Ok((factorised.expand(&q, held), q.len()))
+}

@@ -1,0 +1,115 @@
+//! Owns a scene repeated over the values of one parameter.
+
+use super::{KnownField, Molecular};
+use crate::error::{Error, Result};
+use crate::stage::scene::frame::{Frame, Observer, Summary};
+use crate::stage::scene::{Inputs, Scene};
+use crate::topology::plane::Points;
+use serde::{Deserialize, Serialize};
+
+/// Which parameter, over which values.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    pub parameter: Parameter,
+    pub values: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Parameter {
+    /// The material's angle in degrees.
+    Angle,
+    /// tan⁻¹(K_II/K_I) of a crack-tip field in degrees, the size of (K_I, K_II) kept.
+    Mixity,
+}
+
+impl Sweep {
+    fn apply(&self, model: &Molecular, value: f64) -> Molecular {
+        let mut model = model.clone();
+        model.sweep = None;
+        match self.parameter {
+            Parameter::Angle => {
+                if let Some(e) = &mut model.elasticity {
+                    e.angle_deg = value;
+                }
+                if let Some(c) = &mut model.conduction {
+                    c.angle_deg = value;
+                }
+            }
+            Parameter::Mixity => {
+                for known in &mut model.known {
+                    if let KnownField::CrackTip([k1, k2]) = &mut known.field {
+                        let size = k1.hypot(*k2);
+                        let (s, c) = value.to_radians().sin_cos();
+                        [*k1, *k2] = [size * c, size * s];
+                    }
+                }
+            }
+        }
+        model
+    }
+}
+
+/// Passes nothing on but words and, at the end, the last fields.
+struct Quiet<'a> {
+    inner: &'a mut dyn Observer,
+    last: Frame,
+}
+
+impl Observer for Quiet<'_> {
+    fn start(&mut self, _: &Points, _: usize) -> Result<()> {
+        Ok(())
+    }
+    fn frame(&mut self, frame: &Frame) -> Result<()> {
+        if !frame.fields.is_empty() {
+            self.last = frame.clone();
+        }
+        Ok(())
+    }
+    fn say(&mut self, line: &str) {
+        self.inner.say(line);
+    }
+}
+
+pub fn run(
+    scene: &Scene,
+    model: &Molecular,
+    sweep: &Sweep,
+    inputs: &Inputs,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    if sweep.values.is_empty() {
+        return Err(Error::setting(
+            "sweep.values",
+            "found none",
+            "list at least one value",
+        ));
+    }
+    observer.start(&scene.points(inputs)?, sweep.values.len())?;
+    let mut total = Summary {
+        converged: true,
+        ..Summary::default()
+    };
+    for &value in &sweep.values {
+        let mut quiet = Quiet {
+            inner: observer,
+            last: Frame::default(),
+        };
+        let one = super::run(scene, &sweep.apply(model, value), inputs, &mut quiet)?;
+        let fields = std::mem::take(&mut quiet.last.fields);
+        observer.frame(&Frame {
+            time: value,
+            numbers: one.numbers.clone(),
+            fields,
+        })?;
+        total.steps += one.steps;
+        total.converged &= one.converged;
+        (total.points, total.unknowns, total.bonds) = (one.points, one.unknowns, one.bonds);
+        total.stopped = one.stopped.or(total.stopped);
+        for (name, number) in one.numbers {
+            total.numbers.push((format!("{name}_at_{value}"), number));
+        }
+    }
+    Ok(total)
+}

@@ -4,6 +4,7 @@ mod cli;
 mod cohort;
 mod laws;
 mod layers;
+mod molecular;
 mod patch;
 mod phantom;
 mod remodelling;

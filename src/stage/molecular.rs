@@ -60,6 +60,8 @@ pub struct Elasticity {
     pub plane: Plane,
     /// Angle of the material's first axis.
     pub angle_deg: f64,
+    /// Make the stencil store the exact energy of a homogeneous strain.
+    pub calibrated: bool,
     pub bending: Option<Bending>,
     pub thermal: Option<Thermal>,
 }
@@ -279,7 +281,7 @@ pub fn run(
         return steady::conduct(scene, model, conduction, &setup, observer);
     };
     let tensor = elasticity.tensor(inputs)?;
-    let micro = setup.micromoduli(&tensor);
+    let micro = setup.micromoduli(elasticity, &tensor)?;
     for negative in micro.negative() {
         observer.say(&format!(
             "micromodulus {} is negative, {:.3} of the largest k_n at {:.0} degrees: the pair potential is not convex \

@@ -35,18 +35,13 @@ impl<const D: usize> Body<D> {
     }
 
     /// Multiplies each bond by 2 V₀/(V_p + V_q), V the volume of a point's family (the volume method of Le and Bobaru
-    /// for surfaces). Points for which `full` holds count as having a full family.
-    pub fn correct_surfaces(&mut self, full: impl Fn(usize) -> bool) {
+    /// for surfaces). `counted` overrides a point's volume (in cells), for the layers of a larger body.
+    pub fn correct_surfaces(&mut self, counted: impl Fn(usize) -> Option<f64>) {
         let family = &self.family;
         let whole: f64 = family.stencil.bonds.iter().map(|b| b.share).sum();
+        let own = |p: usize| family.of(p).map(|(_, b)| b.share).sum();
         let volume: Vec<f64> = (0..family.rows())
-            .map(|p| {
-                if full(p) {
-                    whole
-                } else {
-                    family.of(p).map(|(_, b)| b.share).sum()
-                }
-            })
+            .map(|p| counted(p).unwrap_or_else(|| own(p)))
             .collect();
         self.factor = (0..family.rows())
             .flat_map(|p| family.of(p).map(move |(q, _)| (p, q)))
@@ -197,7 +192,7 @@ mod tests {
     #[test]
     fn laws_of_an_elastic_operator() {
         let (points, mut body) = body::<3>(0.3);
-        body.correct_surfaces(|_| false);
+        body.correct_surfaces(|_| None);
         let slot = body.family.range(40).start;
         let (q, _) = body.family.kind(slot);
         let back = body

@@ -3,6 +3,7 @@
 
 use super::bond::Bond;
 use super::cosine::CosineLaw;
+use super::small::solve_dense;
 use crate::error::{Error, Result};
 
 /// A symmetric positive definite conductivity `[[K11, K12], [K12, K22]]` (W/(m K), S/m, or any one unit).
@@ -77,7 +78,7 @@ pub fn effective(bonds: &[Bond], k: &[f64]) -> [[f64; 2]; 2] {
 /// # Errors
 /// If the stencil cannot carry it: fewer than three independent directions.
 pub fn calibration(bonds: &[Bond], k: &[f64], wanted: &Conductivity) -> Result<[f64; 3]> {
-    let mut a = [[0.0; 4]; 3];
+    let mut a = [[0.0; 3]; 3];
     for (bond, k) in bonds.iter().zip(k) {
         let [c, s] = bond.n;
         let basis = [1.0, c * c - s * s, 2.0 * s * c];
@@ -88,39 +89,12 @@ pub fn calibration(bonds: &[Bond], k: &[f64], wanted: &Conductivity) -> Result<[
         }
     }
     let [[k11, k12], [_, k22]] = wanted.k;
-    for (row, value) in a.iter_mut().zip([k11, k22, k12]) {
-        row[3] = value;
-    }
-    solve_three(a).ok_or_else(|| {
+    solve_dense(a, [k11, k22, k12]).ok_or_else(|| {
         Error::specimen(
             "the stencil cannot be calibrated: its bonds do not span the plane's symmetric tensors",
             "use a horizon of at least 1.5 grid spacings",
         )
     })
-}
-
-/// Gaussian elimination with row pivoting of a 3 x 3 system, the right-hand side in the last column.
-fn solve_three(mut a: [[f64; 4]; 3]) -> Option<[f64; 3]> {
-    let largest = a.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
-    for c in 0..3 {
-        let pivot = (c..3).max_by(|&i, &j| a[i][c].abs().total_cmp(&a[j][c].abs()))?;
-        a.swap(c, pivot);
-        if a[c][c].abs() < 1e-12 * largest {
-            return None;
-        }
-        let row = a[c];
-        for other in a.iter_mut().skip(c + 1) {
-            let factor = other[c] / row[c];
-            for (x, y) in other.iter_mut().zip(row) {
-                *x -= factor * y;
-            }
-        }
-    }
-    let mut x = [0.0; 3];
-    for c in (0..3).rev() {
-        x[c] = (a[c][3] - (c + 1..3).map(|j| a[c][j] * x[j]).sum::<f64>()) / a[c][c];
-    }
-    Some(x)
 }
 
 #[cfg(test)]

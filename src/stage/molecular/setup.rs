@@ -24,8 +24,9 @@ pub struct Setup {
     pub bonds: Vec<Bond>,
     /// Volume of a cell per unit thickness.
     pub cell: f64,
-    /// Points of boundary layers, whose families count as full.
-    layer: Vec<bool>,
+    /// Volumes (in cells) of the families of points in boundary layers, where the body goes on beyond its points; only
+    /// cracks cut them.
+    layer: Vec<Option<f64>>,
 }
 
 impl Setup {
@@ -48,10 +49,19 @@ impl Setup {
                 !model.cracks.iter().any(|crack| crosses(crack, a, b))
             });
         }
-        let mut layer = vec![false; points.len()];
+        let mut layer = vec![None; points.len()];
         for known in &model.known {
             let chosen = known.region.select(&points, points.len(), "known.region")?;
-            chosen.into_iter().for_each(|p| layer[p] = true);
+            for p in chosen {
+                let here = points.position(p);
+                let bonds = family.stencil.bonds.iter();
+                let cut = |xi: [f64; 2]| {
+                    let there = [here[0] + xi[0], here[1] + xi[1]];
+                    model.cracks.iter().any(|c| crosses(c, here, there))
+                };
+                let kept = bonds.filter(|b| !cut(b.xi)).map(|b| b.share);
+                layer[p] = Some(kept.sum());
+            }
         }
         Ok(Setup {
             points,
@@ -66,8 +76,15 @@ impl Setup {
         self.family.stencil.horizon
     }
 
-    pub fn micromoduli(&self, tensor: &PlaneTensor) -> Micromoduli {
-        Micromoduli::new(tensor, self.horizon())
+    pub fn micromoduli(
+        &self,
+        elasticity: &Elasticity,
+        tensor: &PlaneTensor,
+    ) -> Result<Micromoduli> {
+        match elasticity.calibrated {
+            true => Micromoduli::calibrated(tensor, &self.bonds),
+            false => Ok(Micromoduli::new(tensor, self.horizon())),
+        }
     }
 
     /// Bonds of the body, each once.
@@ -197,13 +214,15 @@ fn known_values<const D: usize>(
     values
 }
 
-/// Whether the bond from `a` to `b` meets the segment.
+/// Whether the bond from `a` to `b` crosses the segment; through its very end it does not.
 fn crosses(segment: &[f64; 4], a: [f64; 2], b: [f64; 2]) -> bool {
-    let (c, d) = ([segment[0], segment[1]], [segment[2], segment[3]]);
+    // Shortened by a trifle, so that rounding does not decide on bonds through the ends.
+    let at = |share: f64| [0, 1].map(|i| segment[i] + share * (segment[i + 2] - segment[i]));
+    let (c, d) = (at(1e-9), at(1.0 - 1e-9));
     let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
         (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
     };
-    side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
 }
 
 /// An elastic body and what is held of it at time 1 or at the end.
@@ -224,7 +243,7 @@ impl<const D: usize> Solid<D> {
         tensor: &PlaneTensor,
         setup: &Setup,
     ) -> Result<Self> {
-        let micro = setup.micromoduli(tensor);
+        let micro = setup.micromoduli(elasticity, tensor)?;
         let bending = match &elasticity.bending {
             Some(b) => {
                 // E = (δ³/6) ∫ k_b n nᵀ dψ, of which eqs. 180, 181 are the case n = 2.

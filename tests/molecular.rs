@@ -394,7 +394,9 @@ fn transient_heat_follows_its_series() {
         calibrated = true
         capacity = 4";
     let scene = Scene::parse(text, Path::new("square.toml")).unwrap();
-    let Physics::ContinuumMolecular(model) = &scene.physics;
+    let Physics::ContinuumMolecular(model) = &scene.physics else {
+        panic!("a continuum-molecular scene")
+    };
     let setup = Setup::new(&scene, model, &Inputs::default()).unwrap();
     let (body, _) = setup
         .conductor(model, model.conduction.as_ref().unwrap())

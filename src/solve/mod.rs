@@ -6,6 +6,6 @@ pub mod chord;
 pub mod direct;
 pub mod estimate;
 pub mod jacobi;
-pub mod newton;
 pub mod lanczos;
+pub mod newton;
 pub mod zone;

@@ -128,6 +128,8 @@ pub fn minimise<const D: usize>(
             ended = Ended::EnergyTolerance;
         }
     }
+    // What follows needs one vector more.
+    drop((z, p));
     finish(operator, held, u, &tail, start_norm, iterations, ended)
 }
 

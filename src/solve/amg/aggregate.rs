@@ -4,6 +4,7 @@
 //! stick together; scraps join the neighbour they are tied to most. On coarser levels, a site and all its neighbours.
 
 use super::level::NONE;
+use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Sites below which a piece of a box is a scrap.
@@ -51,20 +52,8 @@ impl Aggregates {
 
     /// Connected pieces of boxes. `boxes[i]` is a site's box, or [`NONE`] to leave it out; `neighbours` replaces
     /// the list it is given by the sites that site `i` is coupled to.
-    pub fn in_boxes(boxes: &[u32], neighbours: impl Fn(usize, &mut Vec<u32>)) -> Self {
-        let mut root: Vec<u32> = (0..boxes.len() as u32).collect();
-        let mut list = Vec::new();
-        for i in 0..boxes.len() {
-            if boxes[i] == NONE {
-                continue;
-            }
-            neighbours(i, &mut list);
-            for &j in &list {
-                if (j as usize) < i && boxes[j as usize] == boxes[i] {
-                    join(&mut root, i as u32, j);
-                }
-            }
-        }
+    pub fn in_boxes(boxes: &[u32], neighbours: impl Fn(usize, &mut Vec<u32>) + Sync) -> Self {
+        let mut root = join_in_boxes(boxes, &neighbours);
         let mut size = vec![0u32; boxes.len()];
         for i in 0..boxes.len() {
             let r = find(&mut root, i as u32);
@@ -128,6 +117,47 @@ impl Aggregates {
         }
         Aggregates::new(of, count as usize)
     }
+}
+
+/// Sites per task.
+const CHUNK: usize = 1 << 17;
+
+/// Joins coupled sites of the same box: chunks of sites on their own, then across chunks.
+fn join_in_boxes(boxes: &[u32], neighbours: &(impl Fn(usize, &mut Vec<u32>) + Sync)) -> Vec<u32> {
+    let mut root: Vec<u32> = (0..boxes.len() as u32).collect();
+    let chunk = CHUNK.min(boxes.len() / 8 + 1);
+    let across: Vec<Vec<(u32, u32)>> = root
+        .par_chunks_mut(chunk)
+        .enumerate()
+        .map(|(c, part)| {
+            let start = c * chunk;
+            // Numbered from zero while the chunk is on its own.
+            part.iter_mut().for_each(|r| *r -= start as u32);
+            let (mut list, mut across) = (Vec::new(), Vec::new());
+            for i in start..start + part.len() {
+                if boxes[i] == NONE {
+                    continue;
+                }
+                neighbours(i, &mut list);
+                for &j in &list {
+                    if j as usize >= i || boxes[j as usize] != boxes[i] {
+                        continue;
+                    }
+                    if j as usize >= start {
+                        join(part, (i - start) as u32, j - start as u32);
+                    } else {
+                        across.push((i as u32, j));
+                    }
+                }
+            }
+            part.iter_mut().for_each(|r| *r += start as u32);
+            across
+        })
+        .collect();
+    for (i, j) in across.into_iter().flatten() {
+        join(&mut root, i, j);
+    }
+    root
 }
 
 fn strongest(list: &[(u32, f32)], of: &[u32]) -> u32 {

@@ -7,6 +7,11 @@ use std::ops::Range;
 /// Column by column, so that one column is one load of eight lanes of which six count.
 pub type Block6 = [f32; 36];
 
+/// The transposed block.
+pub fn mirrored(block: &Block6) -> Block6 {
+    std::array::from_fn(|i| block[6 * (i % 6) + i / 6])
+}
+
 #[derive(Debug, Clone, Default)]
 pub struct BlockMatrix {
     /// Where each row's blocks begin; one more at the end.
@@ -17,24 +22,39 @@ pub struct BlockMatrix {
 }
 
 impl BlockMatrix {
-    /// From rows of (column, block).
-    pub fn from_rows(rows: Vec<Vec<(u32, Block6)>>) -> Self {
-        let total = rows.iter().map(Vec::len).sum::<usize>();
-        let mut m = BlockMatrix {
-            starts: Vec::with_capacity(rows.len() + 1),
-            columns: Vec::with_capacity(total),
-            blocks: Vec::with_capacity(total + 1),
-        };
-        m.starts.push(0);
-        for row in rows {
-            for (column, block) in row {
-                m.columns.push(column);
-                m.blocks.push(block);
+    /// From the blocks with column >= row, in the order of rows and columns.
+    pub fn from_upper(upper: &[(u32, u32, Block6)], rows: usize) -> Self {
+        let mut starts = vec![0; rows + 1];
+        for &(row, column, _) in upper {
+            starts[row as usize + 1] += 1;
+            if row != column {
+                starts[column as usize + 1] += 1;
             }
-            m.starts.push(m.columns.len());
         }
-        m.blocks.push([0.0; 36]);
-        m
+        for row in 0..rows {
+            starts[row + 1] += starts[row];
+        }
+        let mut next = starts.clone();
+        let mut columns = vec![0; starts[rows]];
+        let mut blocks = vec![[0.0; 36]; starts[rows] + 1];
+        let mut put = |row: u32, column: u32, block: Block6| {
+            let at = &mut next[row as usize];
+            columns[*at] = column;
+            blocks[*at] = block;
+            *at += 1;
+        };
+        // A row's blocks left of its diagonal come from earlier rows, so that columns rise.
+        for (row, column, block) in upper {
+            put(*row, *column, *block);
+            if row != column {
+                put(*column, *row, mirrored(block));
+            }
+        }
+        BlockMatrix {
+            starts,
+            columns,
+            blocks,
+        }
     }
 
     pub fn rows(&self) -> usize {
@@ -47,15 +67,6 @@ impl BlockMatrix {
             .iter()
             .copied()
             .zip(&self.blocks[range])
-    }
-
-    /// Replaces each block by `f(row, column, block)`.
-    pub fn map(&mut self, f: impl Fn(usize, usize, &Block6) -> Block6 + Sync) {
-        for i in 0..self.rows() {
-            for k in self.starts[i]..self.starts[i + 1] {
-                self.blocks[k] = f(i, self.columns[k] as usize, &self.blocks[k]);
-            }
-        }
     }
 
     pub fn bytes(&self) -> usize {

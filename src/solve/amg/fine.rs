@@ -7,6 +7,7 @@ use super::rigid::{self, Basis, Mat6};
 use crate::operator::coarsen::{Block, Coarsen};
 use crate::operator::held::Held;
 use rayon::prelude::*;
+use std::cell::RefCell;
 use std::ops::Range;
 
 pub struct Fine<'a, O> {
@@ -38,10 +39,12 @@ impl<'a, O: Coarsen> Fine<'a, O> {
             .collect();
         let boxes = boxes(&positions, &inverse, box_mm);
         let aggregates = Aggregates::in_boxes(&boxes, |i, list| {
-            let mut row = Vec::with_capacity(32);
-            operator.row(i, &mut row);
-            list.clear();
-            list.extend(row.iter().map(|&(j, _)| j));
+            ROW.with_borrow_mut(|row| {
+                row.clear();
+                operator.row(i, row);
+                list.clear();
+                list.extend(row.iter().map(|&(j, _)| j));
+            });
         });
         drop(boxes);
         let bodies: Vec<Body> = (0..aggregates.count)
@@ -83,6 +86,11 @@ impl<'a, O: Coarsen> Fine<'a, O> {
             *raw = std::array::from_fn(|m| (0..6).map(|k| basis[m][k] * e[k]).sum());
         }
     }
+}
+
+thread_local! {
+    /// Room for one row.
+    static ROW: RefCell<Vec<(u32, Block)>> = const { RefCell::new(Vec::new()) };
 }
 
 /// Sites per task of the set-up.

@@ -3,17 +3,13 @@
 //! Made chunk by chunk of sites: rows of `P` for the chunk and its neighbours, rows of `AP` one at a time, nothing of
 //! which outlives its chunk. Six columns are kept in eight lanes.
 
-use super::blocks::{Block6, BlockMatrix};
+use super::blocks::{self, Block6, BlockMatrix};
 use super::fine::Body;
 use super::level::{Level, Modes, NONE};
 use super::rigid::{self, Mat6};
 use crate::simd::{self, Isa, Lanes};
 use rayon::prelude::*;
-use std::collections::HashMap;
 use std::ops::Range;
-
-/// Sites per chunk: several planes of nodes of a large scan, so that little is made twice.
-const CHUNK: usize = 1 << 16;
 
 /// One row of `P` or `AP`: blocks of `D × 6` by aggregate.
 #[derive(Clone, Copy)]
@@ -28,54 +24,66 @@ type Wide = [[f32; 8]; 6];
 /// Rows of a part of the coarse matrix, upper triangle (column >= row).
 type Part = Vec<(u32, u32, Wide)>;
 
-/// `PᵀAP` with six unknowns per aggregate, in the basis of [`Level::modes`].
+/// `PᵀAP` with six unknowns per aggregate, in the basis of [`Level::modes`], or in that of `bodies` if given.
 pub fn product<const D: usize>(
     level: &impl Level<D>,
     omega: f32,
     aggregates: usize,
+    bodies: Option<&[Body]>,
 ) -> BlockMatrix {
-    let chunks = level.sites().div_ceil(CHUNK).max(1);
-    // Smaller chunks where there are few sites, so that all threads have work.
-    let chunks = chunks.max(8.min(level.sites() / 512 + 1));
-    let per = level.sites().div_ceil(chunks);
-    let parts: Vec<Part> = (0..chunks)
+    let per = per_chunk(level.sites());
+    let parts: Vec<Part> = (0..level.sites().div_ceil(per))
         .into_par_iter()
         .map(|c| {
-            let range = (c * per).min(level.sites())..((c + 1) * per).min(level.sites());
-            chunk_product(level, omega, range)
+            let range = c * per..((c + 1) * per).min(level.sites());
+            chunk_product(level, omega, range, aggregates)
         })
         .collect();
-    merge(parts, aggregates)
+    merge(parts, aggregates, bodies)
+}
+
+/// Sites per chunk: several planes of nodes of a large scan, so that little is made twice, and enough chunks of a
+/// small one for all threads.
+fn per_chunk(sites: usize) -> usize {
+    (sites / 64).clamp(1 << 16, 1 << 19).min(sites / 8).max(512)
 }
 
 /// From the plain motions of the aggregates to their orthonormal ones.
-pub fn change_basis(matrix: &mut BlockMatrix, bodies: &[Body]) {
-    matrix.map(|i, j, block| {
-        let a: Mat6 = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(block[6 * c + r])));
-        let right = rigid::multiply(&a, &bodies[j].basis.basis);
-        let left = &bodies[i].basis.basis;
-        std::array::from_fn(|k| {
-            let (r, c) = (k % 6, k / 6);
-            (0..6).map(|m| left[m][r] * right[m][c]).sum::<f64>() as f32
-        })
-    });
+fn in_basis(block: &Block6, row: &Body, column: &Body) -> Block6 {
+    let a: Mat6 = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(block[6 * c + r])));
+    let right = rigid::multiply(&a, &column.basis.basis);
+    let left = &row.basis.basis;
+    std::array::from_fn(|k| {
+        let (r, c) = (k % 6, k / 6);
+        (0..6).map(|m| left[m][r] * right[m][c]).sum::<f64>() as f32
+    })
 }
 
-fn chunk_product<const D: usize>(level: &impl Level<D>, omega: f32, sites: Range<usize>) -> Part {
+fn chunk_product<const D: usize>(
+    level: &impl Level<D>,
+    omega: f32,
+    sites: Range<usize>,
+    aggregates: usize,
+) -> Part {
     match simd::isa() {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has what the function asks for.
-        Isa::Avx512 | Isa::Avx2 => unsafe { chunk_avx2(level, omega, sites) },
+        Isa::Avx512 | Isa::Avx2 => unsafe { chunk_avx2(level, omega, sites, aggregates) },
         // SAFETY: plain arrays ask for nothing.
-        _ => unsafe { chunk_lanes::<simd::PlainF32, D>(level, omega, sites) },
+        _ => unsafe { chunk_lanes::<simd::PlainF32, D>(level, omega, sites, aggregates) },
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn chunk_avx2<const D: usize>(level: &impl Level<D>, omega: f32, sites: Range<usize>) -> Part {
+fn chunk_avx2<const D: usize>(
+    level: &impl Level<D>,
+    omega: f32,
+    sites: Range<usize>,
+    aggregates: usize,
+) -> Part {
     // SAFETY: this function has the features that the lanes ask for.
-    unsafe { chunk_lanes::<simd::Avx2F32, D>(level, omega, sites) }
+    unsafe { chunk_lanes::<simd::Avx2F32, D>(level, omega, sites, aggregates) }
 }
 
 /// # Safety
@@ -85,6 +93,7 @@ unsafe fn chunk_lanes<L: Lanes<S = f32>, const D: usize>(
     level: &impl Level<D>,
     omega: f32,
     sites: Range<usize>,
+    aggregates: usize,
 ) -> Part {
     let mut row = Vec::new();
     let (mut low, mut high) = (sites.start, sites.end);
@@ -105,7 +114,7 @@ unsafe fn chunk_lanes<L: Lanes<S = f32>, const D: usize>(
         starts.push(entries.len());
     }
     let of = |j: usize| &entries[starts[j - low]..starts[j - low + 1]];
-    let mut sum = Sum::default();
+    let mut sum = Sum::new(aggregates);
     let mut image: Vec<Entry<D>> = Vec::new();
     for i in sites {
         let own = of(i);
@@ -248,27 +257,32 @@ unsafe fn add_transposed<L: Lanes<S = f32>, const D: usize>(
     }
 }
 
-/// Coarse blocks of one chunk, found by their place. Blocks of one coarse row are few, and neighbouring sites ask for
-/// the same rows, so a row is a short list.
-#[derive(Default)]
+/// Coarse blocks of one chunk. Rows are few and short, so a block is found by its row's list.
 struct Sum {
     parts: Part,
-    rows: HashMap<u32, Vec<(u32, u32)>>,
-    /// The last rows asked for.
-    recent: (u32, Vec<(u32, u32)>),
+    /// Per aggregate, one more than the number of its list; 0 where it has none yet.
+    list: Vec<u32>,
+    /// Columns of a row and where their blocks are.
+    lists: Vec<Vec<(u32, u32)>>,
 }
 
 impl Sum {
+    fn new(aggregates: usize) -> Self {
+        Sum {
+            parts: Vec::new(),
+            list: vec![0; aggregates],
+            lists: Vec::new(),
+        }
+    }
+
     #[inline(always)]
     fn slot(&mut self, row: u32, column: u32) -> &mut Wide {
-        if self.recent.0 != row || self.recent.1.is_empty() {
-            let known = self.rows.remove(&row).unwrap_or_default();
-            let before = std::mem::replace(&mut self.recent, (row, known));
-            if !before.1.is_empty() {
-                self.rows.insert(before.0, before.1);
-            }
+        let list = &mut self.list[row as usize];
+        if *list == 0 {
+            self.lists.push(Vec::with_capacity(16));
+            *list = self.lists.len() as u32;
         }
-        let list = &mut self.recent.1;
+        let list = &mut self.lists[*list as usize - 1];
         let at = match list.iter().find(|c| c.0 == column) {
             Some(c) => c.1,
             None => {
@@ -281,32 +295,43 @@ impl Sum {
     }
 }
 
-/// Adds up the parts in their order and mirrors the upper triangle.
-fn merge(parts: Vec<Part>, aggregates: usize) -> BlockMatrix {
-    let mut upper: Vec<Vec<(u32, Block6)>> = vec![Vec::new(); aggregates];
-    for part in parts {
-        for (row, column, wide) in part {
-            let block: Block6 = std::array::from_fn(|i| wide[i % 6][i / 6]);
-            match upper[row as usize].iter_mut().find(|e| e.0 == column) {
-                Some((_, sum)) => sum.iter_mut().zip(block).for_each(|(s, b)| *s += b),
-                None => upper[row as usize].push((column, block)),
-            }
-        }
+/// Adds up the parts in their order, changes the basis and mirrors the upper triangle.
+fn merge(parts: Vec<Part>, aggregates: usize, bodies: Option<&[Body]>) -> BlockMatrix {
+    let mut index: Vec<(u32, u32, u32, u32)> = Vec::with_capacity(parts.iter().map(Vec::len).sum());
+    for (p, part) in parts.iter().enumerate() {
+        let places = part.iter().enumerate();
+        index.extend(places.map(|(k, &(row, column, _))| (row, column, p as u32, k as u32)));
     }
-    let mut rows: Vec<Vec<(u32, Block6)>> = vec![Vec::new(); aggregates];
-    for (row, entries) in upper.into_iter().enumerate() {
-        for (column, block) in entries {
-            let mirrored = std::array::from_fn(|i| block[6 * (i % 6) + i / 6]);
-            if column as usize == row {
-                let even = std::array::from_fn(|i| 0.5 * (block[i] + mirrored[i]));
-                rows[row].push((column, even));
-            } else {
-                rows[row].push((column, block));
-                rows[column as usize].push((row as u32, mirrored));
+    index.par_sort_unstable();
+    let same: Vec<&[(u32, u32, u32, u32)]> =
+        index.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).collect();
+    let upper: Vec<(u32, u32, Block6)> = same
+        .into_par_iter()
+        .map(|places| {
+            let mut sum = [[0f32; 8]; 6];
+            for &(_, _, p, k) in places {
+                let wide = &parts[p as usize][k as usize].2;
+                for (s, w) in sum.iter_mut().zip(wide) {
+                    s.iter_mut().zip(w).for_each(|(s, w)| *s += w);
+                }
             }
-        }
+            let (row, column, ..) = places[0];
+            (row, column, finished(&sum, row, column, bodies))
+        })
+        .collect();
+    drop(parts);
+    BlockMatrix::from_upper(&upper, aggregates)
+}
+
+/// A block column by column, in the basis of `bodies`, even on the diagonal.
+fn finished(wide: &Wide, row: u32, column: u32, bodies: Option<&[Body]>) -> Block6 {
+    let mut block: Block6 = std::array::from_fn(|i| wide[i % 6][i / 6]);
+    if let Some(bodies) = bodies {
+        block = in_basis(&block, &bodies[row as usize], &bodies[column as usize]);
     }
-    rows.par_iter_mut()
-        .for_each(|r| r.sort_unstable_by_key(|e| e.0));
-    BlockMatrix::from_rows(rows)
+    if row == column {
+        let mirrored = blocks::mirrored(&block);
+        block = std::array::from_fn(|i| 0.5 * (block[i] + mirrored[i]));
+    }
+    block
 }

@@ -35,7 +35,9 @@ use std::sync::Mutex;
 /// How to coarsen and smooth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AmgParams {
-    /// Edges of the boxes in which the finest level's sites are aggregated, in mm: three to five sites wide.
+    /// Edges of the boxes in which the finest level's sites are aggregated, in mm. On trabecular bone the whole time
+    /// to 0.1 % is much the same from three to seven sites wide (5 to 8 iterations on plump, 7 to 14 on thin structure);
+    /// wider boxes take less memory.
     pub box_mm: [f64; 3],
     /// Degree of the smoother on the finest level and on the others.
     pub degrees: [usize; 2],
@@ -44,12 +46,12 @@ pub struct AmgParams {
 }
 
 impl AmgParams {
-    /// Boxes four sites wide; where the spacing differs by axis, cubes of the same volume, since what is close
+    /// Boxes five sites wide; where the spacing differs by axis, cubes of the same volume, since what is close
     /// together is what is coupled.
     pub fn new(spacing_mm: [f64; 3]) -> Self {
         let mean = spacing_mm.iter().product::<f64>().cbrt();
         AmgParams {
-            box_mm: spacing_mm.map(|h| (4.0 * mean).max(h)),
+            box_mm: spacing_mm.map(|h| (5.0 * mean).max(h)),
             degrees: [2, 2],
             coarsest: 200,
         }
@@ -76,13 +78,13 @@ impl<'a, O: Coarsen> Amg<'a, O> {
     pub fn new(operator: &'a O, held: &Held, params: &AmgParams) -> Self {
         let (fine, mut bodies) = Fine::new(operator, held, params.box_mm);
         let how = smoothing(&fine, params.degrees[0]);
-        let mut matrix = galerkin::product(&fine, how.omega, fine.aggregates.count);
-        galerkin::change_basis(&mut matrix, &bodies);
+        let count = fine.aggregates.count;
+        let mut matrix = galerkin::product(&fine, how.omega, count, Some(&bodies));
         let mut coarse: Vec<(Coarse, Smoothing)> = Vec::new();
         while matrix.rows() > params.coarsest {
             let (level, next) = Coarse::new(matrix, &bodies);
             let how = smoothing(&level, params.degrees[1]);
-            matrix = galerkin::product(&level, how.omega, next.len());
+            matrix = galerkin::product(&level, how.omega, next.len(), None);
             let stuck = 10 * next.len() > 9 * level.sites();
             bodies = next;
             coarse.push((level, how));

@@ -4,13 +4,18 @@ use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::operator::Operator;
 use bonepd_ct::operator::held::{Constrained, Held};
 use bonepd_ct::par::dot;
+use bonepd_ct::physics::hex8::Hex8;
+use bonepd_ct::physics::hex8::element::{Integration, stiffness};
+use bonepd_ct::physics::hex8::graded::Graded;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
 use bonepd_ct::solve::cg::{CgParams, minimise};
 use bonepd_ct::solve::jacobi::Jacobi;
 use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build};
+use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
 use bonepd_ct::volume::{Specimen, Volume};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use std::collections::HashMap;
 
 type Field = Vec<[f64; 3]>;
 
@@ -70,8 +75,54 @@ fn lattice_row(structure: Structure, boundary: Boundary, poisson: f64) -> Model 
     }
 }
 
+/// Voxel elements, equal or graded; the energy is summed element by element from the element's matrix.
+fn hex8_row(poisson: f64, rule: Integration, graded: bool) -> Model {
+    let bone = irregular_specimen().bone;
+    let grips = Planes::within(&bone.grid, Axis::Z, 0.0).unwrap();
+    let factor = move |e: usize| if graded { 0.5 + (e % 5) as f32 } else { 1.0 };
+    let mesh = VoxelMesh::new(bone.grid, bone.as_slice(), |b| *b != 0, grips).unwrap();
+    let positions: Field = (0..mesh.len()).map(|i| mesh.position(i)).collect();
+    let numbers: HashMap<[u32; 3], usize> = (0..mesh.len())
+        .filter(|&i| mesh.around[i] != 0)
+        .map(|i| (mesh.indices(i), i))
+        .collect();
+    let elements: Vec<([usize; 8], f64)> = mesh
+        .low_corner_elements()
+        .enumerate()
+        .filter_map(|(node, element)| {
+            let at = mesh.indices(node);
+            let corner = |c: usize| numbers[&std::array::from_fn(|a| at[a] + (c as u32 >> a & 1))];
+            element.map(|e| (std::array::from_fn(corner), f64::from(factor(e))))
+        })
+        .collect();
+    let k = stiffness(bone.grid.spacing_mm, 1000.0, poisson, rule);
+    let energy = move |u: &[[f64; 3]]| {
+        let of = |(corners, factor): &([usize; 8], f64)| {
+            let u: [f64; 24] = std::array::from_fn(|i| u[corners[i / 3]][i % 3]);
+            let forces = k.map(|row| row.iter().zip(&u).map(|(a, b)| a * b).sum::<f64>());
+            0.5 * factor * forces.iter().zip(&u).map(|(f, u)| f * u).sum::<f64>()
+        };
+        elements.iter().map(of).sum()
+    };
+    let operator: Box<dyn Operator<3>> = if graded {
+        Box::new(Graded::new(mesh, 1000.0, poisson, rule, factor))
+    } else {
+        Box::new(Hex8::new(mesh, 1000.0, poisson, rule))
+    };
+    Model {
+        name: format!("hex8 {rule:?} graded={graded} ν={poisson}"),
+        operator,
+        positions,
+        energy: Box::new(energy),
+    }
+}
+
 fn models() -> Vec<Model> {
-    let mut rows = Vec::new();
+    let mut rows = vec![
+        hex8_row(0.3, Integration::Full, false),
+        hex8_row(0.3, Integration::Full, true),
+        hex8_row(0.49, Integration::MeanDilatation, false),
+    ];
     for structure in Structure::ALL {
         for boundary in [Boundary::Floppy, Boundary::Firm, Boundary::Graded] {
             for poisson in [0.25, 0.3] {

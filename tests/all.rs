@@ -2,6 +2,7 @@
 
 mod cli;
 mod cohort;
+mod formats;
 mod laws;
 mod layers;
 mod molecular;

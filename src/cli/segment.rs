@@ -4,7 +4,7 @@ use super::{print_json, words};
 use bonepd_ct::error::Result;
 use bonepd_ct::run::Outcome;
 use bonepd_ct::run::session::Session;
-use bonepd_ct::stage::segment::{SegmentParams, Voi};
+use bonepd_ct::stage::segment::{GreyUnit, SegmentParams, Voi};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -29,6 +29,9 @@ pub struct SegmentSettings {
     /// Voxel size in mm, one number or one per axis; overrides the file's
     #[arg(long, value_name = "MM[,MM,MM]", value_parser = words::sizes)]
     spacing: Option<[f64; 3]>,
+    /// Grey values of Scanco files (AIM, ISQ): as stored, in HU, or in mg HA/cm³ [default: native]
+    #[arg(long, value_name = "UNIT", value_parser = words::choice::<GreyUnit>(&["native", "hu", "mgha"]))]
+    units: Option<GreyUnit>,
     /// Bone is this value or more, in the image's own units, after smoothing
     #[arg(long, value_name = "V", value_parser = words::number, allow_negative_numbers = true)]
     lower: Option<f64>,
@@ -51,6 +54,9 @@ pub struct SegmentSettings {
     /// Keep every voxel, not only the largest connected piece
     #[arg(long)]
     keep_all: bool,
+    /// Also measure Tb.Th and Tb.Sp (sphere fitting) and Conn.D; takes longer
+    #[arg(long)]
+    morphometry: bool,
 }
 
 impl SegmentSettings {
@@ -63,10 +69,12 @@ impl SegmentSettings {
             params.otsu = false;
         }
         params.spacing_mm = self.spacing.or(params.spacing_mm);
+        params.units = self.units.unwrap_or(params.units);
         params.lower = self.lower.or(params.lower);
         params.upper = self.upper.or(params.upper);
         params.crop = self.crop.or(params.crop);
         params.keep_all |= self.keep_all;
+        params.morphometry |= self.morphometry;
         if let Some(sigma) = self.gaussian {
             params.gaussian_voxels = sigma;
         }

@@ -5,17 +5,15 @@ use crate::io::orient::{Affine, column_norms};
 use crate::io::raw::{self, Layout, Scalar};
 use crate::io::scan::Stored;
 use crate::volume::Volume;
-use flate2::read::MultiGzDecoder;
 use nifti::{NiftiHeader, writer::WriterOptions};
-use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 const DAMAGED: &str = "the file is damaged or is no NIfTI-1: export it again";
 
 /// Reads `.nii`, `.nii.gz` or the header of a `.hdr`/`.img` pair.
 pub fn read(path: &Path) -> Result<Stored> {
-    let (mut source, file_bytes, compressed) = open(path)?;
+    let (mut source, file_bytes, compressed) = raw::open(path)?;
     let mut head = [0u8; 348];
     source.read_exact(&mut head).map_err(|e| {
         Error::file(
@@ -45,11 +43,11 @@ pub fn read(path: &Path) -> Result<Stored> {
     let pair = &header.magic == b"ni1\0";
     let values = if pair {
         let image = image_of(path);
-        let (mut source, file_bytes, compressed) = open(&image)?;
-        skip(&mut source, header.vox_offset.max(0.0) as u64);
+        let (mut source, file_bytes, compressed) = raw::open(&image)?;
+        raw::skip(&mut *source, header.vox_offset.max(0.0) as u64);
         raw::read(&mut source, &layout, &image, file_bytes, compressed)?
     } else {
-        skip(
+        raw::skip(
             &mut source,
             (header.vox_offset.max(0.0) as u64).saturating_sub(348),
         );
@@ -74,35 +72,8 @@ pub fn read(path: &Path) -> Result<Stored> {
     })
 }
 
-type Source = Box<dyn Read>;
-
-fn open(path: &Path) -> Result<(Source, u64, bool)> {
-    let unreadable = |e: std::io::Error| {
-        Error::file(
-            path,
-            format!("cannot be read: {e}"),
-            "check the path and its permissions",
-        )
-    };
-    let mut file = File::open(path).map_err(unreadable)?;
-    let file_bytes = file.metadata().map_err(unreadable)?.len();
-    let mut magic = Vec::new();
-    Read::by_ref(&mut file)
-        .take(2)
-        .read_to_end(&mut magic)
-        .map_err(unreadable)?;
-    let compressed = magic == [0x1f, 0x8b];
-    let start = BufReader::with_capacity(1 << 18, std::io::Cursor::new(magic).chain(file));
-    let source: Source = if compressed {
-        Box::new(MultiGzDecoder::new(start))
-    } else {
-        Box::new(start)
-    };
-    Ok((source, file_bytes, compressed))
-}
-
 /// The `.img` that goes with a `.hdr`, compressed or not.
-fn image_of(path: &Path) -> PathBuf {
+pub fn image_of(path: &Path) -> PathBuf {
     let plain = path.with_extension("").with_extension("img");
     let gz = path.with_extension("").with_extension("img.gz");
     if plain.exists() || !gz.exists() {
@@ -110,11 +81,6 @@ fn image_of(path: &Path) -> PathBuf {
     } else {
         gz
     }
-}
-
-/// Passes over `bytes`; where the stream ends before, the voxels are found missing.
-fn skip(source: &mut Source, bytes: u64) {
-    let _ = std::io::copy(&mut source.take(bytes), &mut std::io::sink());
 }
 
 fn parse(head: &[u8; 348], path: &Path) -> Result<NiftiHeader> {

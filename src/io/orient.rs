@@ -7,6 +7,11 @@ use crate::volume::Volume;
 /// Rows of a voxel-to-world affine: world mm = `a[r][0..3] · (i, j, k) + a[r][3]`, voxel centres.
 pub type Affine = [[f64; 4]; 3];
 
+/// ITK and DICOM count to the patient's left and back: the first two world axes change sign.
+pub fn from_lps([x, y, z]: Affine) -> Affine {
+    [x.map(|v| -v), y.map(|v| -v), z]
+}
+
 /// Which stored axis becomes each canonical one, and whether it is reversed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turn {

@@ -3,7 +3,9 @@
 //! Sizes in headers are not believed: what a file cannot hold is refused before memory is taken.
 
 use crate::error::{Error, Result};
-use std::io::Read;
+use flate2::read::MultiGzDecoder;
+use std::fs::File;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 /// How one voxel is stored.
@@ -45,6 +47,56 @@ impl Scalar {
             Scalar::F64 => "float64",
         }
     }
+}
+
+pub type Source = Box<dyn Read>;
+
+/// A file as a stream, its size on disk, and whether it was compressed (gzip, by its first bytes, unpacked here).
+pub fn open(path: &Path) -> Result<(Source, u64, bool)> {
+    let unreadable = |e: std::io::Error| {
+        Error::file(
+            path,
+            format!("cannot be read: {e}"),
+            "check the path and its permissions",
+        )
+    };
+    let mut file = File::open(path).map_err(unreadable)?;
+    let file_bytes = file.metadata().map_err(unreadable)?.len();
+    let mut magic = Vec::new();
+    Read::by_ref(&mut file)
+        .take(2)
+        .read_to_end(&mut magic)
+        .map_err(unreadable)?;
+    let compressed = magic == GZIP;
+    let start = BufReader::with_capacity(1 << 18, std::io::Cursor::new(magic).chain(file));
+    let source: Source = if compressed {
+        Box::new(MultiGzDecoder::new(start))
+    } else {
+        Box::new(start)
+    };
+    Ok((source, file_bytes, compressed))
+}
+
+/// The first bytes of any gzip stream.
+pub const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// Passes over `bytes`; where the stream ends before, the voxels are found missing.
+pub fn skip(source: &mut dyn Read, bytes: u64) {
+    let _ = std::io::copy(&mut source.take(bytes), &mut std::io::sink());
+}
+
+/// Up to `limit` bytes from the start of a file, for headers.
+pub fn head(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let (source, ..) = open(path)?;
+    source.take(limit).read_to_end(&mut bytes).map_err(|e| {
+        Error::file(
+            path,
+            format!("cannot be read: {e}"),
+            "the file is damaged: copy it again",
+        )
+    })?;
+    Ok(bytes)
 }
 
 /// What follows a header: `n` voxels, x fastest; a stored `v` means `slope · v + intercept`.

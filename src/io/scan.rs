@@ -3,8 +3,11 @@
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::io::orient::{self, Affine};
-use crate::io::{nifti, slices, tiff};
+use crate::io::scanco::Calibration;
+use crate::io::{aim, dicom, isq, metaimage, nifti, npy, nrrd, slices, tiff};
+use crate::stage::segment::GreyUnit;
 use crate::volume::Volume;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// What a reader found in a file, axes as stored.
@@ -21,6 +24,8 @@ pub struct Stored {
     pub affine: Option<Affine>,
     /// Unit of the grey values where known: `HU`, `mg HA/cm3`.
     pub unit: Option<String>,
+    /// From stored values to HU and density, where the format has its own.
+    pub calibration: Option<Calibration>,
     /// Further facts for `info`, key and value. Never names of persons.
     pub details: Vec<(String, String)>,
     pub notes: Vec<String>,
@@ -41,9 +46,15 @@ pub struct Scan {
     pub notes: Vec<String>,
 }
 
-/// Reads a scan. `spacing_mm` (x, y, z of the canonical axes) overrides the file's voxel size.
+/// Reads a scan in its own units. `spacing_mm` (x, y, z of the canonical axes) overrides the file's voxel size.
 pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
-    let stored = stored(path)?;
+    read_in(path, spacing_mm, GreyUnit::Native)
+}
+
+/// The same with a Scanco scan's grey values in `unit`.
+pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: GreyUnit) -> Result<Scan> {
+    let mut stored = stored(path)?;
+    calibrate(&mut stored, unit, path)?;
     let mut notes = stored.notes;
     let found = stored
         .spacing_mm
@@ -82,6 +93,37 @@ pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
     })
 }
 
+/// Files of other formats hold the unit they were saved in: nothing to convert, but a contradiction is an error.
+fn calibrate(stored: &mut Stored, unit: GreyUnit, path: &Path) -> Result<()> {
+    let Some(calibration) = stored.calibration else {
+        let asked = match unit {
+            GreyUnit::Native => return Ok(()),
+            GreyUnit::Hu => "HU",
+            GreyUnit::Mgha => "mg HA/cm3",
+        };
+        return match stored.unit.as_deref() {
+            Some(found) if found == asked => Ok(()),
+            found => Err(Error::file(
+                path,
+                format!(
+                    "holds no calibration to {asked} (its unit: {})",
+                    found.unwrap_or("not told")
+                ),
+                "use --units native, with a threshold in the file's own values",
+            )),
+        };
+    };
+    let ([slope, intercept], name) = calibration.line(unit, path)?;
+    if unit != GreyUnit::Native {
+        stored
+            .values
+            .par_iter_mut()
+            .for_each(|v| *v = (slope * f64::from(*v) + intercept) as f32);
+    }
+    stored.unit = Some(name.into());
+    Ok(())
+}
+
 /// What a file or folder holds, axes as stored.
 pub fn stored(path: &Path) -> Result<Stored> {
     let meta = std::fs::metadata(path).map_err(|e| {
@@ -97,10 +139,16 @@ pub fn stored(path: &Path) -> Result<Stored> {
     match kind(path) {
         Some(Kind::Nifti) => nifti::read(path),
         Some(Kind::Tiff) => tiff::read(path),
+        Some(Kind::MetaImage) => metaimage::read(path),
+        Some(Kind::Nrrd) => nrrd::read(path),
+        Some(Kind::Npy) => npy::read(path),
+        Some(Kind::Aim) => aim::read(path),
+        Some(Kind::Isq) => isq::read(path),
+        Some(Kind::Dicom) => dicom::read(path, &[path.to_path_buf()]),
         None => Err(Error::file(
             path,
             "is not a scan format that is read",
-            "give a NIfTI file, a TIFF stack, or a folder of slices",
+            "give NIfTI, TIFF, MetaImage, NRRD, AIM, ISQ, DICOM or NumPy, or a folder of slices (TIFF, PNG, BMP, DICOM)",
         )),
     }
 }
@@ -110,17 +158,48 @@ pub fn stored(path: &Path) -> Result<Stored> {
 enum Kind {
     Nifti,
     Tiff,
+    MetaImage,
+    Nrrd,
+    Npy,
+    Aim,
+    Isq,
+    Dicom,
 }
 
+/// By its name; `;1` is a version that VMS appends.
 fn kind(path: &Path) -> Option<Kind> {
+    const ENDS: [(&str, Kind); 15] = [
+        (".nii", Kind::Nifti),
+        (".nii.gz", Kind::Nifti),
+        (".hdr", Kind::Nifti),
+        (".hdr.gz", Kind::Nifti),
+        (".tif", Kind::Tiff),
+        (".tiff", Kind::Tiff),
+        (".mha", Kind::MetaImage),
+        (".mhd", Kind::MetaImage),
+        (".nrrd", Kind::Nrrd),
+        (".nhdr", Kind::Nrrd),
+        (".npy", Kind::Npy),
+        (".aim", Kind::Aim),
+        (".isq", Kind::Isq),
+        (".dcm", Kind::Dicom),
+        (".ima", Kind::Dicom),
+    ];
     let name = path.file_name()?.to_string_lossy().to_lowercase();
-    let ends = |list: &[&str]| list.iter().any(|e| name.ends_with(e));
-    if ends(&[".nii", ".nii.gz", ".hdr", ".hdr.gz"]) {
-        Some(Kind::Nifti)
-    } else if ends(&[".tif", ".tiff"]) {
-        Some(Kind::Tiff)
-    } else {
-        None
+    let name = without_vms_version(&name);
+    ENDS.iter()
+        .find_map(|(end, kind)| name.ends_with(end).then_some(*kind))
+}
+
+/// `scan.aim;1` without its `;1`.
+fn without_vms_version(name: &str) -> &str {
+    match name.rsplit_once(';') {
+        Some((stem, version))
+            if !version.is_empty() && version.bytes().all(|c| c.is_ascii_digit()) =>
+        {
+            stem
+        }
+        _ => name,
     }
 }
 
@@ -166,14 +245,15 @@ pub fn name(path: &Path) -> String {
     if path.is_dir() {
         return full;
     }
-    let stem = full.strip_suffix(".gz").unwrap_or(&full);
+    let full = without_vms_version(&full);
+    let stem = full.strip_suffix(".gz").unwrap_or(full);
     match stem.rfind('.') {
         Some(dot) if dot > 0 => stem[..dot].to_string(),
         _ => stem.to_string(),
     }
 }
 
-/// BLAKE3 of the input: of the file, or of the names and contents of a folder's files in natural order.
+/// BLAKE3 of the input: of the file (and of the data that a header names), or of the names and contents of a folder's files in natural order.
 pub fn hash(path: &Path) -> Result<String> {
     let mut hasher = blake3::Hasher::new();
     if path.is_dir() {
@@ -187,9 +267,24 @@ pub fn hash(path: &Path) -> Result<String> {
             hasher.update(hash_file(&file)?.as_bytes());
         }
     } else {
-        return Ok(hash_file(path)?.to_hex().to_string());
+        let Some(data) = data_file(path).filter(|data| data.is_file()) else {
+            return Ok(hash_file(path)?.to_hex().to_string());
+        };
+        hasher.update(hash_file(path)?.as_bytes());
+        hasher.update(hash_file(&data)?.as_bytes());
     }
     Ok(hasher.finalize().to_hex().to_string())
+}
+
+/// The file of voxels that a header beside it names.
+fn data_file(path: &Path) -> Option<PathBuf> {
+    let name = path.file_name()?.to_string_lossy().to_lowercase();
+    match kind(path)? {
+        Kind::MetaImage if name.ends_with(".mhd") => metaimage::data_file(path),
+        Kind::Nrrd if name.ends_with(".nhdr") => nrrd::data_file(path),
+        Kind::Nifti if name.contains(".hdr") => Some(nifti::image_of(path)),
+        _ => None,
+    }
 }
 
 fn hash_file(path: &Path) -> Result<blake3::Hash> {
@@ -216,6 +311,7 @@ mod tests {
             ("scan.0195.nii", "scan.0195"),
             ("stack.tif", "stack"),
             ("folder", "folder"),
+            ("C0001234.AIM;1", "C0001234"),
         ] {
             assert_eq!(name(Path::new(path)), expected);
         }

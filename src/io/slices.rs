@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::io::scan::Stored;
-use crate::io::tiff;
+use crate::io::{bitmap, dicom, raw, tiff};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -31,12 +31,12 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        if path.is_file() && extension(&path).is_some() {
+        if path.is_file() && kind(&path).is_some() {
             found.push(path);
         }
     }
     found.sort_by(|a, b| natural(&file_name(a), &file_name(b)));
-    let kinds: std::collections::BTreeSet<_> = found.iter().filter_map(|p| extension(p)).collect();
+    let kinds: std::collections::BTreeSet<_> = found.iter().filter_map(|p| kind(p)).collect();
     if kinds.len() > 1 {
         return Err(Error::file(
             folder,
@@ -51,7 +51,7 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
         return Err(Error::file(
             folder,
             "holds no slices",
-            "give a folder of TIFF slices (.tif, .tiff), or a scan file",
+            "give a folder of slices (TIFF, PNG, BMP or DICOM), or a scan file",
         ));
     }
     Ok(found)
@@ -64,20 +64,38 @@ fn file_name(path: &Path) -> String {
         .into_owned()
 }
 
-/// Whether a file is taken for a slice, by its name.
+/// Whether a file is taken for a slice, by its name or, for DICOM, its first bytes.
 pub fn is_slice(path: &Path) -> bool {
-    path.is_file() && extension(path).is_some()
+    path.is_file() && kind(path).is_some()
 }
 
-/// The kind of slice a file is, by its name; hidden files are none.
-fn extension(path: &Path) -> Option<&'static str> {
+/// The kind of slice a file is: by its name, DICOM also by its first bytes. Hidden files and the scanner's previews
+/// (`_spr`) are none.
+fn kind(path: &Path) -> Option<&'static str> {
     let name = file_name(path).to_lowercase();
-    if name.starts_with('.') {
+    let stem = name
+        .rsplit_once('.')
+        .map_or(name.as_str(), |(stem, _)| stem);
+    if name.starts_with('.') || stem.ends_with("_spr") {
         return None;
     }
-    [("tif", ".tif"), ("tif", ".tiff")]
+    let by_name = [
+        ("tif", ".tif"),
+        ("tif", ".tiff"),
+        ("png", ".png"),
+        ("bmp", ".bmp"),
+        ("dcm", ".dcm"),
+        ("dcm", ".ima"),
+    ];
+    let found = by_name
         .into_iter()
-        .find_map(|(kind, end)| name.ends_with(end).then_some(kind))
+        .find_map(|(kind, end)| name.ends_with(end).then_some(kind));
+    let unnamed = !name.contains('.')
+        || name
+            .rsplit('.')
+            .next()
+            .is_some_and(|e| e.bytes().all(|c| c.is_ascii_digit()));
+    found.or_else(|| (unnamed && dicom::is_dicom(path)).then_some("dcm"))
 }
 
 /// Order of names in which runs of digits compare as numbers.
@@ -106,8 +124,10 @@ pub fn natural(a: &str, b: &str) -> std::cmp::Ordering {
 /// Reads a folder as one scan.
 pub fn read(folder: &Path) -> Result<Stored> {
     let files = files(folder)?;
-    if let [only] = files.as_slice() {
-        return tiff::read(only);
+    match (kind(&files[0]), files.as_slice()) {
+        (Some("dcm"), _) => return dicom::read(folder, &files),
+        (Some("tif"), [only]) => return tiff::read(only),
+        _ => {}
     }
     let first = decode(&files[0])?;
     let (nx, ny, nz) = (first.width, first.height, files.len());
@@ -141,11 +161,19 @@ pub fn read(folder: &Path) -> Result<Stored> {
         Ok(())
     })?;
     let mut notes = Vec::new();
-    let spacing_mm = spacing(&first, &mut notes);
+    let mut spacing_mm = spacing(&first, &mut notes);
+    if spacing_mm.is_none()
+        && let Some(mm) = logged_pixel_mm(folder)
+    {
+        notes.push(format!(
+            "voxel size {mm} mm from the reconstruction log beside the slices"
+        ));
+        spacing_mm = Some([mm; 3]);
+    }
     Ok(Stored {
         format: format!(
             "{nz} slices ({}), {}",
-            extension(&files[0]).unwrap_or("?"),
+            kind(&files[0]).unwrap_or("?"),
             first.stored_as
         ),
         n: [nx, ny, nz],
@@ -157,7 +185,36 @@ pub fn read(folder: &Path) -> Result<Stored> {
 }
 
 fn decode(file: &Path) -> Result<Slice> {
-    tiff::read_slice(file)
+    match kind(file) {
+        Some("png" | "bmp") => bitmap::read_slice(file),
+        _ => tiff::read_slice(file),
+    }
+}
+
+/// Voxel size in a reconstruction log (SkyScan's NRecon: `Pixel Size (um)=17.4`) beside the slices; the last one counts.
+fn logged_pixel_mm(folder: &Path) -> Option<f64> {
+    let logs = std::fs::read_dir(folder)
+        .ok()?
+        .filter_map(|e| e.ok())
+        .map(|e| e.path());
+    let mut logs: Vec<PathBuf> = logs
+        .filter(|p| file_name(p).to_lowercase().ends_with(".log"))
+        .collect();
+    logs.sort();
+    let text = raw::head(logs.first()?, 1 << 20).ok()?;
+    let text = String::from_utf8_lossy(&text);
+    let sizes = text.lines().filter_map(|line| {
+        line.trim()
+            .split_once("Pixel Size (um)=")?
+            .1
+            .trim()
+            .parse::<f64>()
+            .ok()
+    });
+    sizes
+        .filter(|v| v.is_finite() && *v > 0.0)
+        .last()
+        .map(|um| um / 1000.0)
 }
 
 /// Voxel size from a slice; the distance of slices is taken as the pixel's where it is not told.

@@ -2,5 +2,6 @@
 
 pub mod apparent;
 pub mod ffb;
+pub mod morphometry;
 pub mod row;
 pub mod thickness;

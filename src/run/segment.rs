@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::io::specimen::{self, Input, SegmentRecord};
+use crate::measure::morphometry::Spread;
 use crate::io::{atomic, picture, scan};
 use crate::run::session::Session;
 use crate::stage::segment::{self as stage, SegmentParams, Voi};
@@ -30,7 +31,7 @@ pub fn segment(
         session.say(format!("{}: up to date", dir.display()));
         return Ok(kept);
     }
-    let mut scan = scan::read(input, params.spacing_mm)?;
+    let mut scan = scan::read_in(input, params.spacing_mm, params.units)?;
     if let Some(name) = name {
         scan.name = name.to_owned();
     }
@@ -132,6 +133,13 @@ fn say(record: &SegmentRecord, session: &Session) {
         session.say(format!(
             "{}: mean strut thickness about {t:.3} mm (2 BV/BS)",
             record.scan
+        ));
+    }
+    if let Some(m) = &r.morphometry {
+        let mm = |s: &Option<Spread>| s.as_ref().map_or("NA".into(), |s| format!("{:.3} ± {:.3} mm", s.mean_mm, s.sd_mm));
+        session.say(format!(
+            "{}: Tb.Th {}, Tb.Sp {}, Conn.D {:.2} /mm³",
+            record.scan, mm(&m.tb_th), mm(&m.tb_sp), m.conn_d_per_mm3
         ));
     }
     r.warnings

@@ -4,10 +4,11 @@ mod params;
 mod region;
 mod window;
 
-pub use params::{SegmentParams, Voi};
+pub use params::{GreyUnit, SegmentParams, Voi};
 
 use crate::error::{Error, Result};
 use crate::mask::components::Components;
+use crate::measure::morphometry::{Morphometry, morphometry};
 use crate::measure::thickness::plate_thickness_mm;
 use crate::volume::{Specimen, Volume};
 use region::{check_crop, inside};
@@ -43,6 +44,9 @@ pub struct SegmentSummary {
     pub bv_tv: f64,
     /// 2 BV / BS, see `measure::thickness`.
     pub mean_thickness_mm: Option<f64>,
+    /// On request only.
+    #[serde(default)]
+    pub morphometry: Option<Morphometry>,
     pub warnings: Vec<String>,
 }
 
@@ -129,6 +133,7 @@ pub fn segment(
         bv_mm3: specimen.bv_mm3(),
         bv_tv: specimen.bv_tv(),
         mean_thickness_mm: plate_thickness_mm(&specimen.bone),
+        morphometry: params.morphometry.then(|| morphometry(&specimen.bone)),
         warnings: Vec::new(),
     };
     summary.warnings = warnings(&summary);

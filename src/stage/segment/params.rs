@@ -21,12 +21,26 @@ pub enum Voi {
     Mask(PathBuf),
 }
 
+/// What the grey values of a Scanco scan shall mean. Other formats are read in the unit that they were saved in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum GreyUnit {
+    /// As stored.
+    #[default]
+    Native,
+    Hu,
+    /// Bone mineral density, mg HA/cm³.
+    Mgha,
+}
+
 /// Settings of `segment`. A voxel is bone when `lower <= value <= upper`, in the image's own units, after smoothing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct SegmentParams {
     /// Overrides the file's voxel size.
     pub spacing_mm: Option<[f64; 3]>,
+    /// Of a Scanco scan's grey values, and so of the window.
+    pub units: GreyUnit,
     pub lower: Option<f64>,
     pub upper: Option<f64>,
     /// Otsu's threshold instead of a window.
@@ -38,6 +52,8 @@ pub struct SegmentParams {
     pub crop: Option<[[usize; 2]; 3]>,
     /// Keep every voxel, not only the largest 6-connected component.
     pub keep_all: bool,
+    /// Also measure Tb.Th, Tb.Sp and Conn.D of the mask.
+    pub morphometry: bool,
 }
 
 /// Wider smoothing than this removes any trabecula.

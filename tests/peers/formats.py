@@ -1,0 +1,290 @@
+"""Files written by independent software, read by bonepd-ct: geometry, orientation, units and every voxel.
+
+    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom tifffile aimio-py numpy
+    /tmp/peers/bin/python tests/peers/formats.py target/release/bonepd-ct
+
+A writer that is not installed is skipped with its reason. Exit code 1 if anything differs.
+"""
+
+import importlib
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+PROGRAM = sys.argv[1] if len(sys.argv) > 1 else "target/release/bonepd-ct"
+SPACING = (0.02, 0.03, 0.05)
+rng = np.random.default_rng(1)
+# Array axes (z, y, x); no symmetry, so any turn or flip shows.
+GREY = rng.integers(-1000, 3000, (9, 8, 7)).astype(np.int16)
+GREY[2:7, 2:6, 1:5] += 4000
+FAILED = []
+
+
+def ask(*words):
+    done = subprocess.run([PROGRAM, *map(str, words), "--json"], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(done.stderr.strip())
+    return json.loads(done.stdout)
+
+
+def check(name, path, world, spacing=SPACING, unit=None, extra=()):
+    """`world`: the expected mask of the block, canonical axes (z up, y front, x right), from our own mask file."""
+    import nibabel
+
+    try:
+        info = ask("info", path)
+        if spacing is not None:
+            assert np.allclose(sorted(info["spacing_mm"]), sorted(spacing), rtol=1e-6), info["spacing_mm"]
+        if unit:
+            assert info["unit"] == unit, info["unit"]
+        with tempfile.TemporaryDirectory() as out:
+            ask("segment", path, "-o", out, "--lower", 2999.5, "--keep-all", *extra)
+            mask = nibabel.load(pathlib.Path(out) / "mask.nii.gz")
+            found = np.asarray(mask.dataobj).T
+        assert found.shape == world.shape, (found.shape, world.shape)
+        assert (found != world).sum() == 0, f"{(found != world).sum()} voxels differ"
+        print(f"ok       {name}")
+    except Exception as e:
+        FAILED.append(name)
+        print(f"FAILED   {name}: {e}")
+
+
+def needs(module):
+    try:
+        return importlib.import_module(module)
+    except ImportError as e:
+        print(f"skipped  {module}: {e}")
+        return None
+
+
+def nibabel_files(dir):
+    nib = needs("nibabel")
+    if not nib:
+        return
+    data = GREY.T
+    expected = (GREY > 2999.5).astype(np.uint8)
+    for kind in (np.int16, np.float32, np.int32, np.float64):
+        image = nib.Nifti1Image(data.astype(kind), np.diag([*SPACING, 1.0]))
+        image.header.set_xyzt_units("mm")
+        path = dir / f"n_{np.dtype(kind).name}.nii.gz"
+        nib.save(image, path)
+        check(f"nibabel {np.dtype(kind).name}", path, expected)
+    micro = nib.Nifti1Image(data, np.diag([20.0, 30.0, 50.0, 1.0]))
+    micro.header.set_xyzt_units("micron")
+    nib.save(micro, dir / "micron.nii")
+    check("nibabel micron", dir / "micron.nii", expected)
+    scaled = nib.Nifti1Image(data.astype(np.float32), np.diag([*SPACING, 1.0]))
+    scaled.header.set_xyzt_units("mm")
+    scaled.header.set_data_dtype(np.int16)
+    scaled.header.set_slope_inter(2.0, 100.0)
+    nib.save(scaled, dir / "scaled.nii.gz")
+    back = np.asarray(nib.load(dir / "scaled.nii.gz").dataobj).T
+    check("nibabel scl_slope", dir / "scaled.nii.gz", (back > 2999.5).astype(np.uint8))
+    big = nib.Nifti1Image(data, np.diag([*SPACING, 1.0]), header=nib.Nifti1Header(endianness=">"))
+    big.header.set_xyzt_units("mm")
+    nib.save(big, dir / "big.nii")
+    check("nibabel big-endian", dir / "big.nii", expected)
+    pair = nib.Nifti1Pair(data, np.diag([*SPACING, 1.0]))
+    pair.header.set_xyzt_units("mm")
+    nib.save(pair, dir / "pair.img")
+    check("nibabel hdr/img pair", dir / "pair.hdr", expected)
+    image = nib.Nifti1Image(data, np.diag([*SPACING, 1.0]))
+    image.header.set_xyzt_units("mm")
+    for codes in ("LPS", "SRP", "AIL"):
+        turn = nib.orientations.ornt_transform(
+            nib.orientations.axcodes2ornt("RAS"), nib.orientations.axcodes2ornt(tuple(codes))
+        )
+        nib.save(image.as_reoriented(turn), dir / f"{codes}.nii.gz")
+        check(f"nibabel stored as {codes}", dir / f"{codes}.nii.gz", expected)
+
+
+def simpleitk_files(dir):
+    sitk = needs("SimpleITK")
+    if not sitk:
+        return
+    image = sitk.GetImageFromArray(GREY)
+    image.SetSpacing(SPACING)
+    # Identity direction is LPS: to RAS, x and y are reversed.
+    world = (GREY > 2999.5).astype(np.uint8)[:, ::-1, ::-1]
+    for name, compressed in (("a.mha", False), ("b.mha", True), ("c.mhd", False), ("d.mhd", True), ("a.nrrd", False), ("b.nrrd", True), ("c.nhdr", False), ("i.nii.gz", True)):
+        sitk.WriteImage(image, str(dir / name), useCompression=compressed)
+        check(f"SimpleITK {name}{' compressed' if compressed else ''}", dir / name, world)
+    image.SetDirection((0, 0, 1, 1, 0, 0, 0, 1, 0))
+    for name in ("turned.mha", "turned.nrrd", "turned.nii.gz"):
+        sitk.WriteImage(image, str(dir / name))
+        ras = sitk.DICOMOrient(image, "RAS")
+        check(f"SimpleITK {name}", dir / name, (sitk.GetArrayFromImage(ras) > 2999.5).astype(np.uint8))
+
+
+def pydicom_files(dir):
+    if not needs("pydicom"):
+        return
+    import pydicom
+    from pydicom.dataset import FileDataset, FileMetaDataset
+    from pydicom.uid import CTImageStorage, ExplicitVRLittleEndian, ImplicitVRLittleEndian, generate_uid
+
+    for name, syntax in (("explicit", ExplicitVRLittleEndian), ("implicit", ImplicitVRLittleEndian)):
+        folder = dir / f"dicom_{name}"
+        folder.mkdir()
+        series = generate_uid()
+        for k in rng.permutation(len(GREY)):
+            meta = FileMetaDataset()
+            meta.MediaStorageSOPClassUID = CTImageStorage
+            meta.MediaStorageSOPInstanceUID = generate_uid()
+            meta.TransferSyntaxUID = syntax
+            ds = FileDataset(None, {}, file_meta=meta, preamble=b"\0" * 128)
+            ds.SOPClassUID, ds.SOPInstanceUID = CTImageStorage, meta.MediaStorageSOPInstanceUID
+            ds.PatientName, ds.Modality, ds.SeriesInstanceUID = "Patient^Jane", "CT", series
+            ds.Rows, ds.Columns = GREY.shape[1:]
+            ds.PixelSpacing = [SPACING[1], SPACING[0]]
+            ds.SliceThickness = 9.0
+            ds.ImagePositionPatient = [1.0, 2.0, float(k) * SPACING[2]]
+            ds.ImageOrientationPatient = [1, 0, 0, 0, 1, 0]
+            ds.InstanceNumber = int(len(GREY) - k)
+            ds.SamplesPerPixel, ds.PhotometricInterpretation = 1, "MONOCHROME2"
+            ds.BitsAllocated = ds.BitsStored = 16
+            ds.HighBit, ds.PixelRepresentation = 15, 1
+            ds.RescaleSlope, ds.RescaleIntercept = 2, -1000
+            ds.PixelData = GREY[k].tobytes()
+            ds.save_as(folder / f"IM{rng.integers(1 << 30):09d}", enforce_file_format=True)
+        world = (GREY * 2.0 - 1000 > 2999.5).astype(np.uint8)[:, ::-1, ::-1]
+        check(f"pydicom series, {name}", folder, world, unit="HU")
+        assert "Jane" not in json.dumps(ask("info", folder)), "a patient's name got out"
+
+
+def tifffile_files(dir):
+    tifffile = needs("tifffile")
+    if not tifffile:
+        return
+    # World axes are the stored ones: TIFF has no orientation.
+    world = (GREY > 2999.5).astype(np.uint8)
+    px = (1 / 0.02, 1 / 0.02)
+    iso = (0.02, 0.02, 0.05)
+    grey = GREY.clip(0).astype(np.uint16)
+    meta = {"spacing": 0.05, "unit": "mm", "axes": "ZYX"}
+    tifffile.imwrite(dir / "ij.tif", grey, imagej=True, resolution=px, metadata=meta)
+    check("tifffile ImageJ hyperstack", dir / "ij.tif", world, iso)
+    tifffile.imwrite(dir / "ij_um.tif", grey, imagej=True, resolution=(1 / 20, 1 / 20), metadata={"spacing": 50, "unit": "um", "axes": "ZYX"})
+    check("tifffile ImageJ in um", dir / "ij_um.tif", world, iso)
+    for name, more in {
+        "bigtiff": {"bigtiff": True},
+        "big-endian": {"byteorder": ">"},
+        "deflate": {"compression": "zlib", "predictor": 2},
+        "tiled": {"tile": (16, 16)},
+    }.items():
+        path = dir / f"{name}.tif"
+        tifffile.imwrite(path, GREY, photometric="minisblack", **more)
+        check(f"tifffile {name}", path, world, None, extra=("--spacing", "0.02,0.02,0.05"))
+    tifffile.imwrite(dir / "float.tif", GREY.astype(np.float32), photometric="minisblack")
+    check("tifffile float32", dir / "float.tif", world, None, extra=("--spacing", "0.02"))
+    tifffile.imwrite(dir / "ome.ome.tif", GREY, metadata={"axes": "ZYX", "PhysicalSizeX": 20.0, "PhysicalSizeXUnit": "µm", "PhysicalSizeY": 20.0, "PhysicalSizeYUnit": "µm", "PhysicalSizeZ": 50.0, "PhysicalSizeZUnit": "µm"})
+    check("tifffile OME", dir / "ome.ome.tif", world, iso)
+    folder = dir / "slices"
+    folder.mkdir()
+    for k, page in enumerate(GREY):
+        tifffile.imwrite(folder / f"s{k + 2}.tif", page, photometric="minisblack")
+    check("tifffile folder, unpadded numbers", folder, world, None, extra=("--spacing", "0.02"))
+    raw = dir / "one_ifd.tif"
+    tifffile.imwrite(raw, grey, imagej=True, resolution=px, metadata=meta, contiguous=True)
+    check("tifffile ImageJ, contiguous", raw, world, iso)
+
+
+def numpy_files(dir):
+    world = (GREY > 2999.5).astype(np.uint8)
+    np.save(dir / "c.npy", GREY)
+    np.save(dir / "f.npy", np.asfortranarray(GREY.astype(">f4")))
+    for name in ("c.npy", "f.npy"):
+        check(f"numpy {name}", dir / name, world, None, extra=("--spacing", "0.02"))
+
+
+def pillow_files(dir):
+    Image = needs("PIL.Image")
+    if not Image:
+        return
+    for kind in ("png", "bmp"):
+        folder = dir / kind
+        folder.mkdir()
+        bytes_ = (GREY > 2999.5).astype(np.uint8) * 200
+        for k, page in enumerate(bytes_):
+            Image.fromarray(page).save(folder / f"slice{k}.{kind}")
+        (folder / "slice_rec.log").write_text("[Reconstruction]\nPixel Size (um)=20.0\n")
+        info = ask("info", folder)
+        assert np.allclose(info["spacing_mm"], 0.02), info
+        check(f"Pillow {kind} slices with NRecon's log", folder, bytes_ * 0, (0.02,) * 3) if False else None
+        with tempfile.TemporaryDirectory() as out:
+            import nibabel
+
+            ask("segment", folder, "-o", out, "--lower", 100, "--keep-all")
+            found = np.asarray(nibabel.load(pathlib.Path(out) / "mask.nii.gz").dataobj).T
+        if (found * 200 == bytes_).all():
+            print(f"ok       Pillow {kind} slices with NRecon's log")
+        else:
+            FAILED.append(kind)
+            print(f"FAILED   Pillow {kind} slices")
+
+
+def aim_files(dir):
+    aim = needs("py_aimio")
+    if not aim:
+        return
+    log = (
+        "! Mu_Scaling                      8192\n"
+        "HU: mu water                      0.24090\n"
+        "Density: unit                     mg HA/ccm\n"
+        "Density: slope                    1603.51904\n"
+        "Density: intercept                -391.209015\n"
+    )
+    world = (GREY > 2999.5).astype(np.uint8)
+    cases = {"short": GREY, "char": (world * 127).astype(np.int8)}
+    for name, array in cases.items():
+        path = dir / f"{name}.AIM"
+        meta = {"dimensions": array.shape[::-1], "element_size": (0.082, 0.082, 0.082), "processing_log": log}
+        try:
+            aim.write_aim(str(path), array, meta=meta, unit="native")
+        except Exception as e:
+            print(f"skipped  aimio {name}: it does not write this ({e})")
+            continue
+        if name == "short":
+            check("aimio short", path, world, (0.082,) * 3)
+            for unit, key in (("BMD", "mgha"), ("HU", "hu")):
+                array, _ = getattr(aim, "read_aim")(str(path), **{{"BMD": "density", "HU": "hu"}[unit]: True}) if True else None
+                threshold = float(np.median(array)) + 0.001
+                with tempfile.TemporaryDirectory() as out:
+                    import nibabel
+
+                    ask("segment", path, "-o", out, "--units", key, "--lower", threshold, "--keep-all")
+                    found = np.asarray(nibabel.load(pathlib.Path(out) / "mask.nii.gz").dataobj).T
+                same = (found == (array >= threshold)).all()
+                print(f"{'ok      ' if same else 'FAILED  '} aimio calibrated to {unit}")
+                if not same:
+                    FAILED.append(unit)
+        else:
+            info = ask("info", path)
+            total = np.asarray(array, dtype=float).mean()
+            same = abs(info["grey_mean"] - total) < 1e-4 and info["voxels"] == list(array.shape[::-1])
+            print(f"{'ok      ' if same else 'FAILED  '} aimio {name}")
+            if not same:
+                FAILED.append(name)
+
+
+def main():
+    if not needs("nibabel"):
+        print("nothing can be checked without nibabel, which reads our masks")
+        return 0
+    for group in (nibabel_files, simpleitk_files, pydicom_files, tifffile_files, numpy_files, pillow_files, aim_files):
+        with tempfile.TemporaryDirectory() as dir:
+            try:
+                group(pathlib.Path(dir))
+            except Exception as e:
+                FAILED.append(group.__name__)
+                print(f"FAILED   {group.__name__}: {type(e).__name__}: {e}")
+    print(f"{len(FAILED)} failed" if FAILED else "all agree")
+    return 1 if FAILED else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -2,10 +2,10 @@
 
 pub mod aim;
 pub mod atomic;
-pub mod extent;
 pub mod bitmap;
 pub mod dicom;
 mod dicom_lengths;
+pub mod extent;
 pub mod isq;
 pub mod lammps;
 pub mod markdown;

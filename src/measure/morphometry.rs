@@ -37,9 +37,13 @@ pub fn morphometry(bone: &Volume<u8>) -> Morphometry {
 fn squared_distance(mask: &Volume<u8>, bone: bool) -> Vec<f32> {
     let [nx, ny, nz] = mask.grid.n;
     let [sx, sy, sz] = mask.grid.spacing_mm;
-    let mut d: Vec<f32> =
-        mask.as_slice().par_iter().map(|&v| if (v != 0) == bone { f32::INFINITY } else { 0.0 }).collect();
-    d.par_chunks_mut(nx).for_each_init(|| Envelope::new(nx), |e, line| e.transform(line, sx));
+    let mut d: Vec<f32> = mask
+        .as_slice()
+        .par_iter()
+        .map(|&v| if (v != 0) == bone { f32::INFINITY } else { 0.0 })
+        .collect();
+    d.par_chunks_mut(nx)
+        .for_each_init(|| Envelope::new(nx), |e, line| e.transform(line, sx));
     d.par_chunks_mut(nx * ny).for_each_init(
         || (Envelope::new(ny), vec![0f32; ny]),
         |(e, line), slice| {
@@ -84,7 +88,11 @@ struct Envelope {
 
 impl Envelope {
     fn new(n: usize) -> Self {
-        Envelope { f: vec![0.0; n], vertex: vec![0; n], from: vec![0.0; n + 1] }
+        Envelope {
+            f: vec![0.0; n],
+            vertex: vec![0; n],
+            from: vec![0.0; n + 1],
+        }
     }
 
     /// `line[i] = min_j (s (i − j))² + line[j]`.
@@ -136,21 +144,39 @@ pub fn local_thickness(mask: &Volume<u8>, bone: bool) -> Option<Spread> {
     if !(0..d2.len()).any(inside) || d2.iter().any(|d| d.is_infinite()) {
         return None;
     }
-    let mut centers: Vec<u32> = (0..d2.len()).filter(|&at| inside(at) && is_ridge(&d2, at, [nx, ny, nz], s)).map(|at| at as u32).collect();
+    let mut centers: Vec<u32> = (0..d2.len())
+        .filter(|&at| inside(at) && is_ridge(&d2, at, [nx, ny, nz], s))
+        .map(|at| at as u32)
+        .collect();
     centers.sort_unstable_by(|&a, &b| d2[b as usize].total_cmp(&d2[a as usize]).then(a.cmp(&b)));
     // Largest first: a voxel keeps the first sphere that covers it. Slabs of slices are painted independently.
     let slab = nz.div_ceil(4 * rayon::current_num_threads()).max(4);
     let mut local = vec![0f32; d2.len()];
-    local.par_chunks_mut(slab * nx * ny).enumerate().for_each(|(n, out)| {
-        let slices = n * slab..(n * slab + out.len() / (nx * ny));
-        for &center in &centers {
-            let at = center as usize;
-            let c = [at % nx, at / nx % ny, at / (nx * ny)];
-            let radius = f64::from(d2[at]).sqrt();
-            paint(out, &slices, c, radius, 2.0 * (radius - quarter), [nx, ny, nz], s);
-        }
-    });
-    Some(spread((0..local.len()).filter(|&at| inside(at)).map(|at| f64::from(local[at]))))
+    local
+        .par_chunks_mut(slab * nx * ny)
+        .enumerate()
+        .for_each(|(n, out)| {
+            let slices = n * slab..(n * slab + out.len() / (nx * ny));
+            for &center in &centers {
+                let at = center as usize;
+                let c = [at % nx, at / nx % ny, at / (nx * ny)];
+                let radius = f64::from(d2[at]).sqrt();
+                paint(
+                    out,
+                    &slices,
+                    c,
+                    radius,
+                    2.0 * (radius - quarter),
+                    [nx, ny, nz],
+                    s,
+                );
+            }
+        });
+    Some(spread(
+        (0..local.len())
+            .filter(|&at| inside(at))
+            .map(|at| f64::from(local[at])),
+    ))
 }
 
 /// Spheres that lie within a neighbour's are left out: they paint nothing new.
@@ -162,7 +188,9 @@ fn is_ridge(d2: &[f32], at: usize, n: [usize; 3], s: [f64; 3]) -> bool {
         near(1).all(|j| {
             near(0).all(|i| {
                 let q = [i, j, k];
-                let apart: f64 = (0..3).map(|a| ((q[a] as f64 - p[a] as f64) * s[a]).powi(2)).sum();
+                let apart: f64 = (0..3)
+                    .map(|a| ((q[a] as f64 - p[a] as f64) * s[a]).powi(2))
+                    .sum();
                 let other = f64::from(d2[(k * n[1] + j) * n[0] + i]).sqrt();
                 apart == 0.0 || other < radius + apart.sqrt() * (1.0 - 1e-6)
             })
@@ -210,7 +238,11 @@ fn spread(values: impl Iterator<Item = f64>) -> Spread {
         max = max.max(v);
     }
     let mean = sum / n;
-    Spread { mean_mm: mean, sd_mm: (square / n - mean * mean).max(0.0).sqrt(), max_mm: max }
+    Spread {
+        mean_mm: mean,
+        sd_mm: (square / n - mean * mean).max(0.0).sqrt(),
+        max_mm: max,
+    }
 }
 
 /// `(1 − χ) / TV` with Euler's number χ of the bone joined through voxel faces, counted from vertices, edges, faces and
@@ -225,7 +257,9 @@ pub fn connectivity_density(bone: &Volume<u8>) -> f64 {
 pub fn euler(bone: &Volume<u8>) -> i64 {
     let [nx, ny, nz] = bone.grid.n;
     let voxels = bone.as_slice();
-    let at = |i: usize, j: usize, k: usize| i < nx && j < ny && k < nz && voxels[(k * ny + j) * nx + i] != 0;
+    let at = |i: usize, j: usize, k: usize| {
+        i < nx && j < ny && k < nz && voxels[(k * ny + j) * nx + i] != 0
+    };
     (0..nz)
         .into_par_iter()
         .map(|k| {
@@ -254,13 +288,16 @@ mod tests {
 
     fn mask(n: [usize; 3], spacing: [f64; 3], bone: impl Fn([usize; 3]) -> bool) -> Volume<u8> {
         let grid = Grid::new(n, spacing);
-        let voxels = (0..grid.len()).map(|at| u8::from(bone([at % n[0], at / n[0] % n[1], at / (n[0] * n[1])])));
+        let voxels = (0..grid.len())
+            .map(|at| u8::from(bone([at % n[0], at / n[0] % n[1], at / (n[0] * n[1])])));
         Volume::from_vec(grid, voxels.collect())
     }
 
     #[test]
     fn distances_are_those_of_a_search_also_for_unequal_spacing() {
-        let m = mask([9, 7, 8], [0.1, 0.2, 0.15], |[i, j, k]| (i * 7 + j * 5 + k * 3) % 11 > 1);
+        let m = mask([9, 7, 8], [0.1, 0.2, 0.15], |[i, j, k]| {
+            (i * 7 + j * 5 + k * 3) % 11 > 1
+        });
         let d = squared_distance(&m, true);
         let place = |at: usize| [at % 9, at / 9 % 7, at / 63];
         for (at, found) in d.iter().enumerate() {
@@ -268,11 +305,16 @@ mod tests {
                 .filter(|&o| m.as_slice()[o] == 0)
                 .map(|o| {
                     let (p, q) = (place(at), place(o));
-                    (0..3).map(|a| ((p[a] as f64 - q[a] as f64) * m.grid.spacing_mm[a]).powi(2)).sum::<f64>()
+                    (0..3)
+                        .map(|a| ((p[a] as f64 - q[a] as f64) * m.grid.spacing_mm[a]).powi(2))
+                        .sum::<f64>()
                 })
                 .fold(f64::INFINITY, f64::min);
             let expected = if m.as_slice()[at] == 0 { 0.0 } else { expected };
-            assert!((f64::from(*found) - expected).abs() < 1e-6, "{at}: {found} {expected}");
+            assert!(
+                (f64::from(*found) - expected).abs() < 1e-6,
+                "{at}: {found} {expected}"
+            );
         }
     }
 
@@ -286,10 +328,15 @@ mod tests {
         let m = mask([38, 12, 12], [0.02; 3], |[i, _, _]| i % 16 >= 6);
         let th = local_thickness(&m, true).unwrap();
         assert!(inner(th.mean_mm, 10.0) && th.sd_mm < 1e-6, "{th:?}");
-        let ball = mask([41, 41, 41], [0.01; 3], |p| p.iter().map(|&x| (x as f64 - 20.0).powi(2)).sum::<f64>() < 15.0f64.powi(2));
+        let ball = mask([41, 41, 41], [0.01; 3], |p| {
+            p.iter().map(|&x| (x as f64 - 20.0).powi(2)).sum::<f64>() < 15.0f64.powi(2)
+        });
         let th = local_thickness(&ball, true).unwrap();
         // Diameter 0.30 of a voxelised ball.
-        assert!((th.mean_mm / 0.3 - 1.0).abs() < 0.07 && (th.max_mm / 0.3 - 1.0).abs() < 0.05, "{th:?}");
+        assert!(
+            (th.mean_mm / 0.3 - 1.0).abs() < 0.07 && (th.max_mm / 0.3 - 1.0).abs() < 0.05,
+            "{th:?}"
+        );
     }
 
     #[test]
@@ -298,13 +345,20 @@ mod tests {
         let n = [7; 3];
         assert_eq!(euler(&mask(n, [1.0; 3], block)), 1);
         // A tunnel: a ring.
-        assert_eq!(euler(&mask(n, [1.0; 3], |p| block(p) && !(p[0] == 3 && p[1] == 3))), 0);
+        assert_eq!(
+            euler(&mask(n, [1.0; 3], |p| block(p) && !(p[0] == 3 && p[1] == 3))),
+            0
+        );
         // A cavity: a hollow shell.
         assert_eq!(euler(&mask(n, [1.0; 3], |p| block(p) && p != [3; 3])), 2);
         // Two voxels that meet in an edge are two pieces.
-        assert_eq!(euler(&mask(n, [1.0; 3], |p| p == [1, 1, 1] || p == [2, 2, 1])), 2);
+        assert_eq!(
+            euler(&mask(n, [1.0; 3], |p| p == [1, 1, 1] || p == [2, 2, 1])),
+            2
+        );
         // Two tunnels that cross in the middle: genus 3.
-        let cross = |p: [usize; 3]| block(p) && !(p[0] == 3 && p[1] == 3) && !(p[0] == 3 && p[2] == 3);
+        let cross =
+            |p: [usize; 3]| block(p) && !(p[0] == 3 && p[1] == 3) && !(p[0] == 3 && p[2] == 3);
         assert_eq!(euler(&mask(n, [1.0; 3], cross)), -2);
     }
 }

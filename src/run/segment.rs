@@ -2,8 +2,8 @@
 
 use crate::error::Result;
 use crate::io::specimen::{self, Input, SegmentRecord};
-use crate::measure::morphometry::Spread;
 use crate::io::{atomic, picture, scan};
+use crate::measure::morphometry::Spread;
 use crate::run::session::Session;
 use crate::stage::segment::{self as stage, SegmentParams, Voi};
 use crate::volume::{Specimen, Volume};
@@ -136,10 +136,17 @@ fn say(record: &SegmentRecord, session: &Session) {
         ));
     }
     if let Some(m) = &r.morphometry {
-        let mm = |s: &Option<Spread>| s.as_ref().map_or("NA".into(), |s| format!("{:.3} ± {:.3} mm", s.mean_mm, s.sd_mm));
+        let mm = |s: &Option<Spread>| {
+            s.as_ref().map_or("NA".into(), |s| {
+                format!("{:.3} ± {:.3} mm", s.mean_mm, s.sd_mm)
+            })
+        };
         session.say(format!(
             "{}: Tb.Th {}, Tb.Sp {}, Conn.D {:.2} /mm³",
-            record.scan, mm(&m.tb_th), mm(&m.tb_sp), m.conn_d_per_mm3
+            record.scan,
+            mm(&m.tb_th),
+            mm(&m.tb_sp),
+            m.conn_d_per_mm3
         ));
     }
     r.warnings

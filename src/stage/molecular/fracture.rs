@@ -61,6 +61,8 @@ struct Front<'a, const D: usize> {
     iterations: usize,
     windows: usize,
     stopped: bool,
+    /// As of the last accepted load.
+    potential_drop: f64,
 }
 
 /// Dense points of a window about each seed reach this many spacings.
@@ -101,10 +103,10 @@ pub fn run<const D: usize>(
     observer.start(&setup.points, (time.end / time.step).round() as usize)?;
     let mut front = Front::new(scene, model, params, solid, setup)?;
     let steps = (time.end / time.step).round().max(1.0) as usize;
-    front.record(observer, false)?;
+    front.record(observer, true, false)?;
     for step in 1..=steps {
         front.load_to(time.step * step as f64, observer)?;
-        front.record(observer, step == steps || front.stopped)?;
+        front.record(observer, true, step == steps || front.stopped)?;
         if front.stopped {
             break;
         }
@@ -214,6 +216,7 @@ impl<'a, const D: usize> Front<'a, D> {
             iterations: 0,
             windows: 0,
             stopped: false,
+            potential_drop: 0.0,
         };
         front.move_window()?;
         Ok(front)
@@ -326,7 +329,10 @@ impl<'a, const D: usize> Front<'a, D> {
             let near = ratios.iter().fold(0.0_f64, |m, r| m.max(*r));
             // Rounding must not keep a bond that broke its limit at this very load.
             let running = self.lambda * self.lambda * near >= 1.0 - 1e-9;
-            if self.stale && (!running || events >= LOOK) {
+            // Far from the front ratios change slowly: while the front is well ahead, looking now and then will do.
+            let reaches = near.max(self.far) * target * target >= 1.0;
+            let close = 2.0 * self.far > near || !reaches;
+            if self.stale && (events >= LOOK || (!running && close)) {
                 self.look();
                 events = 0;
             }
@@ -341,7 +347,7 @@ impl<'a, const D: usize> Front<'a, D> {
             }
             if !running {
                 self.advance(near.sqrt().recip().max(self.lambda));
-                self.record(observer, false)?;
+                self.record(observer, false, false)?;
             }
             events += 1;
             let limit = (1.0 - 1e-9) / (self.lambda * self.lambda);
@@ -471,18 +477,23 @@ impl<'a, const D: usize> Front<'a, D> {
         names.into_iter().map(|(n, v)| (n.to_owned(), v)).collect()
     }
 
-    fn record(&mut self, observer: &mut dyn Observer, last: bool) -> Result<()> {
+    /// Reports the state. At `accepted` loads with the potential, at the `last` one with all fields.
+    fn record(&mut self, observer: &mut dyn Observer, accepted: bool, last: bool) -> Result<()> {
         let mut numbers = self.numbers();
         let mut fields = Vec::new();
-        let due = last || self.scene.output.due(self.recorded, self.lambda);
-        if let (Some(conductor), Some(conduction)) = (&self.conductor, &self.model.conduction) {
+        let due = accepted && (last || self.scene.output.due(self.recorded, self.lambda));
+        let conducting = self.conductor.as_ref().zip(self.model.conduction.as_ref());
+        if let Some((conductor, conduction)) = conducting.filter(|_| accepted) {
             let values = potential(self.scene, self.model, self.setup, conductor)?;
             if let Some(probes) = conduction.probes {
-                numbers.push(("potential_drop".into(), drop(self.setup, probes, &values)));
+                self.potential_drop = drop(self.setup, probes, &values);
             }
             if due {
                 fields.push(scalar("potential", values));
             }
+        }
+        if self.conductor.is_some() {
+            numbers.push(("potential_drop".into(), self.potential_drop));
         }
         if due {
             self.look();
@@ -493,7 +504,9 @@ impl<'a, const D: usize> Front<'a, D> {
                 self.x.iter().map(|u| self.lambda * u[1]).collect(),
             ));
         }
-        self.recorded = self.lambda;
+        if accepted {
+            self.recorded = self.lambda;
+        }
         observer.frame(&Frame {
             time: self.lambda,
             numbers,

@@ -598,3 +598,102 @@ fn compression_breaks_nothing() {
     let (pulled, _) = solved(&text(1.0));
     assert!(number(&pulled, "broken_bonds") > 0.0);
 }
+
+/// A 6 x 6 stiffness cut to a plane drives a scene as the plane tensor itself does.
+#[test]
+fn a_scanned_stiffness_is_cut_to_the_scenes_plane() {
+    let (young, nu) = (1000.0, 0.2);
+    let lambda = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
+    let mu = 0.5 * young / (1.0 + nu);
+    let six: [[f64; 6]; 6] = std::array::from_fn(|i| {
+        std::array::from_fn(|j| match (i < 3 && j < 3, i == j) {
+            (true, true) => lambda + 2.0 * mu,
+            (true, false) => lambda,
+            (false, true) => mu,
+            _ => 0.0,
+        })
+    });
+    let text = |material: &str| {
+        format!(
+            "title = 'block'
+            hold = [{{ region = {{ edge = 'left' }}, component = 'x' }},
+                    {{ region = {{ edge = 'left' }}, component = 'y' }},
+                    {{ region = {{ edge = 'right' }}, component = 'x', value = 0.1 }}]
+            {PLATE}
+            [physics.continuum-molecular.elasticity]
+            {material}"
+        )
+    };
+    let inputs = Inputs {
+        stiffness: Some(six),
+        ..Inputs::default()
+    };
+    let energy = |material: &str| {
+        let scene = Scene::parse(&text(material), Path::new("block.toml")).unwrap();
+        number(
+            &run(&scene, &inputs, &mut Kept::default()).unwrap(),
+            "energy",
+        )
+    };
+    let scanned = energy("from_scan = { file = 'c.json', axes = ['x', 'z'] }");
+    let known = energy("young = 1000\npoisson = 0.2");
+    assert!((scanned / known - 1.0).abs() < 1e-12, "{scanned} {known}");
+}
+
+/// Peak force of a compact tension specimen of cortical bone, slit along the bone's axis: W = 25.8 mm, 1.25 W x 1.2 W,
+/// spacing 0.6 mm. `toughness` in MPa sqrt(m) scales both fracture energies of eqs. 109, 110.
+fn compact_tension_peak(slit: f64, toughness: f64) -> f64 {
+    let scale = (toughness / 4.0) * (toughness / 4.0);
+    let (summary, _) = solved(&format!(
+        "title = 'compact tension'
+        hold = [{{ region = {{ box = [0, 10.2, 0.6, 12] }}, component = 'y',
+                   value = {{ times = [0, 1], values = [0, 0.5] }} }},
+                {{ region = {{ box = [0, -12, 0.6, -10.2] }}, component = 'y',
+                   value = {{ times = [0, 1], values = [0, -0.5] }} }},
+                {{ region = {{ point = [25.5, 0.3] }}, component = 'x' }},
+                {{ region = {{ point = [25.5, 0.3] }}, component = 'y' }}]
+        [geometry.polygon]
+        corners = [[-6.45, -15.48], [25.8, -15.48], [25.8, 15.48], [-6.45, 15.48]]
+        round_holes = [[0, 7.095, 3.225], [0, -7.095, 3.225]]
+        [grid]
+        spacing = 0.6
+        horizon_ratio = 5
+        partial_volumes = true
+        [time]
+        end = 1
+        step = 0.01
+        [physics.continuum-molecular]
+        cracks = [[-10, 0, {slit}, 0]]
+        [physics.continuum-molecular.elasticity]
+        moduli = [25000, 16250, 5890, 6650, 0, 0]
+        [physics.continuum-molecular.fracture]
+        energy = [{}, {}]
+        exponent = 8
+        tip = [{slit}, 0]
+        unbreakable = [{{ disc = [0, 11, 5] }}, {{ disc = [0, -11, 5] }}]
+        stop = {{ box = [{}, -2, 30, 2] }}",
+        2.10562 * scale,
+        0.98905 * scale,
+        slit + 3.6,
+    ));
+    number(&summary, "peak_load")
+}
+
+/// The peak is that of linear elastic fracture mechanics, P = K W^(1/2)/f(a/W) per mm of thickness with ASTM E399's f, to
+/// 5 %, for two slits and two toughnesses (measured -0.6, -2.9 and -0.6 %).
+#[test]
+#[ignore = "a minute: cargo test --release -- --ignored compact_tension"]
+fn compact_tension_peaks_are_those_of_fracture_mechanics() {
+    for (slit, toughness) in [(9.3_f64, 4.0_f64), (12.9, 4.0), (9.3, 2.0)] {
+        let w = 25.8_f64;
+        let x: f64 = slit / w;
+        let polynomial = 0.886 + 4.64 * x - 13.32 * x * x + 14.72 * x.powi(3) - 5.6 * x.powi(4);
+        let f = (2.0 + x) * polynomial / (1.0 - x).powf(1.5);
+        let expected = toughness * 1000.0_f64.sqrt() * w.sqrt() / f;
+        let found = compact_tension_peak(slit, toughness);
+        assert!(
+            (found / expected - 1.0).abs() < 0.05,
+            "a = {slit}: {found} {expected}"
+        );
+    }
+}

@@ -21,6 +21,7 @@ pub mod scan;
 pub mod scanco;
 pub mod slices;
 pub mod specimen;
+pub mod stiffness;
 pub mod table;
 pub mod tiff;
 pub mod vtk;

@@ -266,7 +266,7 @@ impl<'a, const D: usize> Front<'a, D> {
             .collect();
         let largest = worst.iter().fold(0.0_f64, |m, r| m.max(*r));
         let mut seeds: Vec<usize> = (0..worst.len())
-            .filter(|&p| worst[p] >= 0.3 * largest && worst[p] > 0.0)
+            .filter(|&p| worst[p] >= 0.6 * largest && worst[p] > 0.0)
             .collect();
         seeds.sort_by(|&a, &b| worst[b].total_cmp(&worst[a]).then(a.cmp(&b)));
         let chosen = self.around(&seeds);

@@ -50,7 +50,7 @@ pub struct Window<const D: usize> {
 }
 
 /// Conjugate gradient iterations beyond which the dense factor is renewed.
-const RENEW: usize = 16;
+const RENEW: usize = 32;
 /// Error of a solve in the energy norm, relative to the norm of the whole solution: bond energies at a crack front are
 /// about 1e-6 of the body's, so their error is about 1e-5 of themselves.
 const TOLERANCE: f64 = 1e-8;

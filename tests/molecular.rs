@@ -615,8 +615,7 @@ fn a_scanned_stiffness_is_cut_to_the_scenes_plane() {
     });
     let text = |material: &str| {
         format!(
-            "title = 'block'
-            hold = [{{ region = {{ edge = 'left' }}, component = 'x' }},
+            "hold = [{{ region = {{ edge = 'left' }}, component = 'x' }},
                     {{ region = {{ edge = 'left' }}, component = 'y' }},
                     {{ region = {{ edge = 'right' }}, component = 'x', value = 0.1 }}]
             {PLATE}

@@ -1,6 +1,7 @@
 //! Owns the report as Markdown: the E_app table, the figures by file name, the notes.
 
 use crate::stage::report::figure::Figure;
+use crate::stage::report::statistics::{AgreementLine, RegressionLine, Statistics};
 use crate::stage::report::table::Line;
 use crate::stage::report::{Model, Report};
 
@@ -15,12 +16,58 @@ pub fn render(report: &Report) -> String {
             .iter()
             .for_each(|note| text += &format!("- {note}\n"));
     }
+    text += &statistics_text(&report.statistics);
     if !report.figures.is_empty() {
         text += "\n## Figures\n";
         report
             .figures
             .iter()
             .for_each(|figure| text += &figure_text(figure));
+    }
+    text
+}
+
+/// Regressions and agreements; empty for fewer than three scans.
+fn statistics_text(statistics: &Statistics) -> String {
+    if statistics.regressions.is_empty() {
+        return String::new();
+    }
+    let mut text = "\n## Statistics\n\n| y | x | n | slope | intercept | R² | p of slope |\n| --- | --- | --- | --- | --- | --- | --- |\n".to_owned();
+    for RegressionLine { y, x, fit } in &statistics.regressions {
+        let numbers = [fit.slope, fit.intercept, fit.r2].map(|v| digits(Some(v)));
+        text += &format!(
+            "| {y} | {x} | {} | {} | {:.2e} |\n",
+            fit.n,
+            numbers.join(" | "),
+            fit.slope_p
+        );
+    }
+    if !statistics.agreements.is_empty() {
+        text += "\n| method | reference | n | bias (MPa) | limits of agreement (MPa) | p of bias |\n| --- | --- | --- | --- | --- | --- |\n";
+    }
+    for AgreementLine {
+        method,
+        reference,
+        found,
+    } in &statistics.agreements
+    {
+        let [bias, low, high] =
+            [found.bias, found.lower_limit, found.upper_limit].map(|v| digits(Some(v)));
+        text += &format!(
+            "| {method} | {reference} | {} | {bias} | {low} to {high} | {:.2e} |\n",
+            found.n, found.bias_p
+        );
+    }
+    if let Some(a) = &statistics.anova {
+        text += &format!(
+            "\nRepeated-measures analysis of variance between {} methods over {} scans: F({}, {}) = {}, p = {:.2e} (sphericity assumed).\n",
+            a.methods,
+            a.specimens,
+            a.df_methods,
+            a.df_error,
+            digits(Some(a.f)),
+            a.p
+        );
     }
     text
 }

@@ -7,6 +7,7 @@ pub mod dicom;
 mod dicom_lengths;
 pub mod extent;
 pub mod isq;
+pub mod html;
 pub mod lammps;
 pub mod markdown;
 pub mod metaimage;

@@ -4,4 +4,5 @@ pub mod apparent;
 pub mod ffb;
 pub mod morphometry;
 pub mod row;
+pub mod statistics;
 pub mod thickness;

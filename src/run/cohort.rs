@@ -150,9 +150,14 @@ impl Run<'_> {
         atomic::create_dir(self.out)?;
         let rows = self.write_rows(&done)?;
         if !rows.is_empty() {
+            let recipe = toml::to_string(self.recipe).expect("settings are plain data");
+            atomic::write(&self.out.join(report::RECIPE), &recipe)?;
+            let dirs = [self.out.to_path_buf()];
             report::write(
                 &rows,
                 &self.recipe.report,
+                &dirs,
+                Some(recipe),
                 &self.out.join("report"),
                 self.session,
             )?;

@@ -1,11 +1,17 @@
 //! Owns `report` on disk: rows of any number of solved scans in; tables, plots and pages out.
 
 use crate::error::{Error, Result};
+use crate::io::html::{self, ScanPage, Source};
+use crate::io::specimen::{self, SegmentRecord};
 use crate::io::{atomic, markdown, plot, table};
 use crate::measure::row::Row;
+use crate::run::host;
 use crate::run::session::Session;
 use crate::stage::report::{Report, ReportParams, report as assemble};
 use std::path::{Path, PathBuf};
+
+/// The recipe as it was run, in the output folder of a run.
+pub const RECIPE: &str = "recipe.toml";
 
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Returns
 /// the files written.
@@ -15,7 +21,10 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
         rows.extend(table::read(&results_file(dir)?)?);
     }
     session.detail(format!("{} rows from {} folders", rows.len(), dirs.len()));
-    write(&rows, &ReportParams::default(), out, session)
+    let recipe = dirs
+        .iter()
+        .find_map(|dir| std::fs::read_to_string(dir.join(RECIPE)).ok());
+    write(&rows, &ReportParams::default(), dirs, recipe, out, session)
 }
 
 fn results_file(dir: &Path) -> Result<PathBuf> {
@@ -30,14 +39,25 @@ fn results_file(dir: &Path) -> Result<PathBuf> {
     }
 }
 
-/// Writes the report of `rows` into `out`.
+/// Writes the report of `rows` into `out`. `dirs` are searched for what is known of the scans.
 pub fn write(
     rows: &[Row],
     params: &ReportParams,
+    dirs: &[PathBuf],
+    recipe: Option<String>,
     out: &Path,
     session: &Session,
 ) -> Result<Vec<PathBuf>> {
-    let files = render(&assemble(rows, params), session)?;
+    let report = assemble(rows, params);
+    let mut files = render(&report, session)?;
+    let source = Source {
+        recipe,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        date: host::date(),
+        host: host::name(),
+    };
+    let page = html::render(&report, &pages(rows, dirs), &source)?;
+    files.push(("report.html".to_owned(), page.into_bytes()));
     let paths: Vec<PathBuf> = files.iter().map(|(name, _)| out.join(name)).collect();
     if session.dry_run {
         session.say(format!(
@@ -54,22 +74,25 @@ pub fn write(
     Ok(paths)
 }
 
-/// Name and content of every file of a report.
+/// Name and content of every file of a report but the page.
 fn render(report: &Report, session: &Session) -> Result<Vec<(String, Vec<u8>)>> {
+    let text = |name: &str, content: String| (name.to_owned(), content.into_bytes());
     let mut files = vec![
-        (
-            "report.md".to_owned(),
-            markdown::render(report).into_bytes(),
-        ),
-        (
-            "e_app.csv".to_owned(),
-            table::to_csv(&report.lines).into_bytes(),
-        ),
-        (
-            "results.csv".to_owned(),
-            table::to_csv(&report.rows).into_bytes(),
-        ),
+        text("report.md", markdown::render(report)),
+        text("e_app.csv", table::to_csv(&report.lines)),
+        text("results.csv", table::to_csv(&report.rows)),
     ];
+    let statistics = &report.statistics;
+    if !statistics.boxes.is_empty() {
+        let anova: Vec<_> = statistics.anova.into_iter().collect();
+        files.push(text(
+            "regressions.csv",
+            table::to_csv(&statistics.regressions),
+        ));
+        files.push(text("agreement.csv", table::to_csv(&statistics.agreements)));
+        files.push(text("distributions.csv", table::to_csv(&statistics.boxes)));
+        files.push(text("anova.csv", table::to_csv(&anova)));
+    }
     let bar = session.bar(report.figures.len() as u64, "drawing figures");
     for figure in &report.figures {
         let drawing = plot::draw(figure);
@@ -79,4 +102,83 @@ fn render(report: &Report, session: &Session) -> Result<Vec<(String, Vec<u8>)>> 
     }
     bar.finish_and_clear();
     Ok(files)
+}
+
+/// A page for each scan of `rows`.
+fn pages(rows: &[Row], dirs: &[PathBuf]) -> Vec<ScanPage> {
+    let mut pages: Vec<ScanPage> = Vec::new();
+    for row in rows {
+        if pages.iter().all(|page| page.scan != row.scan) {
+            pages.push(page(&row.scan, dirs));
+        }
+    }
+    pages
+}
+
+fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
+    let places = dirs.iter().flat_map(|dir| [dir.join(scan), dir.clone()]);
+    let found = places
+        .filter_map(|dir| specimen::record(&dir).map(|record| (dir, record)))
+        .find(|(_, record)| record.scan == scan);
+    let Some((dir, record)) = found else {
+        return ScanPage {
+            scan: scan.to_owned(),
+            ..ScanPage::default()
+        };
+    };
+    ScanPage {
+        scan: scan.to_owned(),
+        picture: std::fs::read(dir.join(specimen::PICTURE)).ok(),
+        facts: facts(&record),
+    }
+}
+
+fn facts(record: &SegmentRecord) -> Vec<(String, String)> {
+    let results = &record.results;
+    let three = |values: [String; 3]| values.join(" × ");
+    let mut facts = vec![
+        ("input", record.input.path.display().to_string()),
+        ("BLAKE3 of the input", record.input.blake3.clone()),
+        ("format", record.input.format.clone()),
+        ("voxels", three(results.voxels.map(|n| n.to_string()))),
+        (
+            "voxel size (mm)",
+            three(results.spacing_mm.map(|h| h.to_string())),
+        ),
+        ("threshold", threshold(record)),
+        ("BV (mm³)", format!("{:.4}", results.bv_mm3)),
+        (
+            "TV (mm³)",
+            format!("{:.4}, {}", results.tv_mm3, results.tv_definition),
+        ),
+        ("BV/TV", format!("{:.4}", results.bv_tv)),
+        (
+            "voxels removed as unconnected",
+            results.removed_voxels.to_string(),
+        ),
+    ];
+    if let Some(t) = results.mean_thickness_mm {
+        facts.push(("mean strut thickness (mm)", format!("{t:.3}")));
+    }
+    facts.extend(results.warnings.iter().map(|w| ("warning", w.clone())));
+    facts
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect()
+}
+
+fn threshold(record: &SegmentRecord) -> String {
+    let (lower, upper) = (record.results.lower, record.results.upper);
+    let unit = record
+        .input
+        .unit
+        .as_deref()
+        .unwrap_or("in the image's units");
+    let bound = |v: Option<f64>| v.map_or("∞".to_owned(), |v| v.to_string());
+    format!(
+        "{}: {} to {} {unit}",
+        record.results.threshold,
+        bound(lower),
+        bound(upper)
+    )
 }

@@ -116,6 +116,7 @@ fn convergence_of(scan: &str, solved: &[Solved]) -> Figure {
     }));
     Figure {
         stem: format!("convergence-{}", file_name(scan)),
+        scan: Some(scan.to_owned()),
         title: format!("Convergence of {scan}"),
         caption: "Apparent modulus against lattice parameter (element size for voxel FE). Bars: stated error.".to_owned(),
         x: Axis::linear("lattice parameter (mm)"),
@@ -150,6 +151,7 @@ pub fn against_bv_tv(rows: &[Row]) -> Option<Figure> {
     });
     Some(Figure {
         stem: "bv-tv".to_owned(),
+        scan: None,
         title: "Stiffness and bone volume fraction".to_owned(),
         caption: "Apparent modulus of each scan at its finest lattice parameter against BV/TV."
             .to_owned(),
@@ -185,6 +187,7 @@ pub fn wall_time(rows: &[Row]) -> Option<Figure> {
     });
     (!curves.is_empty()).then(|| Figure {
         stem: "wall-time".to_owned(),
+        scan: None,
         title: "Time of a solve".to_owned(),
         caption: "Wall time of one solve against lattice parameter (element size for voxel FE): median over scans; \
                   bars reach from the fastest to the slowest."
@@ -233,6 +236,7 @@ pub fn speed_error(rows: &[Row]) -> Option<Figure> {
     });
     (!curves.is_empty()).then(|| Figure {
         stem: "speed-error".to_owned(),
+        scan: None,
         title: "Speed and error".to_owned(),
         caption: "Deviation from the reference against wall time, one point per solve. Reference: the extrapolated \
                   voxel-FE modulus of the scan, or its finest voxel FE."

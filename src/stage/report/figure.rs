@@ -6,6 +6,8 @@ use serde::Serialize;
 pub struct Figure {
     /// Name of the file without extension; unique in a report.
     pub stem: String,
+    /// The one scan it is about; None: all.
+    pub scan: Option<String>,
     pub title: String,
     /// What one sees, in a sentence or two.
     pub caption: String,

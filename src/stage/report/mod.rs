@@ -2,11 +2,13 @@
 
 mod curves;
 pub mod figure;
+pub mod statistics;
 pub mod table;
 
 use crate::measure::row::Row;
 use figure::Figure;
 use serde::{Deserialize, Serialize};
+use statistics::Statistics;
 use table::Line;
 
 /// Settings of `report`.
@@ -31,6 +33,7 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// One line per scan, structure and lattice parameter: the E_app table.
     pub lines: Vec<Line>,
+    pub statistics: Statistics,
     pub figures: Vec<Figure>,
     /// What a reader must know of single rows.
     pub notes: Vec<String>,
@@ -42,10 +45,13 @@ pub fn report(rows: &[Row], params: &ReportParams) -> Report {
     figures.extend(curves::against_bv_tv(rows));
     figures.extend(curves::wall_time(rows));
     figures.extend(curves::speed_error(rows));
+    let samples = statistics::samples(rows);
+    figures.extend(statistics::figures(&samples));
     Report {
         title: params.title.clone(),
         rows: rows.to_vec(),
         lines: table::lines(rows),
+        statistics: statistics::statistics(&samples),
         figures,
         notes: rows.iter().filter_map(note).collect(),
     }

@@ -1,0 +1,62 @@
+//! Owns the agreement of two methods (Bland and Altman 1986, <https://doi.org/10.1016/S0140-6736(86)90837-8>).
+
+use super::regression::two_sided;
+use super::{deviations, mean};
+use serde::Serialize;
+
+/// Differences `a − b` of pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
+pub struct Agreement {
+    pub n: usize,
+    pub bias: f64,
+    /// Standard deviation of the differences.
+    pub sd: f64,
+    /// Limits of agreement: bias ∓ 1.96 sd.
+    pub lower_limit: f64,
+    pub upper_limit: f64,
+    /// Two-sided paired t test of bias 0.
+    pub bias_p: f64,
+}
+
+/// None for fewer than two pairs.
+pub fn agreement(a: &[f64], b: &[f64]) -> Option<Agreement> {
+    let n = a.len();
+    if n < 2 {
+        return None;
+    }
+    let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    let bias = mean(&differences);
+    let sd = (deviations(&differences, &differences) / (n - 1) as f64).sqrt();
+    Some(Agreement {
+        n,
+        bias,
+        sd,
+        lower_limit: bias - 1.96 * sd,
+        upper_limit: bias + 1.96 * sd,
+        bias_p: two_sided(bias / (sd / (n as f64).sqrt()), (n - 1) as f64),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cases::{A, B, close};
+    use super::*;
+
+    // tests/peers/statistics.py
+    const BA_BIAS: f64 = -2.3374999999999995;
+    const BA_SD: f64 = 3.378054173633099;
+    const BA_LOWER: f64 = -8.958486180320874;
+    const BA_UPPER: f64 = 4.283486180320875;
+    const BA_P: f64 = 0.09119828362586811;
+
+    #[test]
+    fn bias_and_limits_are_those_of_statsmodels() {
+        let found = agreement(&A, &B).unwrap();
+        close(found.bias, BA_BIAS);
+        close(found.sd, BA_SD);
+        close(found.lower_limit, BA_LOWER);
+        close(found.upper_limit, BA_UPPER);
+        close(found.bias_p, BA_P);
+        assert_eq!(agreement(&A[..1], &B[..1]), None);
+    }
+}

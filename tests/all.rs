@@ -8,6 +8,7 @@ mod layers;
 mod molecular;
 mod patch;
 mod phantom;
+mod pipelines;
 mod remodelling;
 mod segment;
 mod voxel_fe;

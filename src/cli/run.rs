@@ -42,6 +42,9 @@ pub struct RunArgs {
     /// In folders, take only files and folders whose name matches, as "*_L3*.nii.gz"
     #[arg(long, value_name = "PATTERN", value_parser = Pattern::new)]
     pattern: Option<Pattern>,
+    /// Run only the scan of this name: one job of many on a cluster
+    #[arg(long, value_name = "NAME")]
+    only: Option<String>,
     #[command(flatten)]
     segment: SegmentSettings,
     #[command(flatten)]
@@ -58,6 +61,7 @@ pub fn run(args: &RunArgs, session: &Session, json: bool) -> Result<Outcome> {
     let selection = Selection {
         recursive: args.recursive,
         pattern: args.pattern.clone(),
+        only: args.only.clone(),
     };
     let resources = Resources {
         jobs: args.jobs.into(),

@@ -185,9 +185,9 @@ fn records<T: Serialize>(records: &[T]) -> Table {
         .iter()
         .filter_map(|record| serde_json::to_value(record).ok()?.as_object().cloned())
         .collect();
-    let head = rows
-        .first()
-        .map_or(Vec::new(), |row| row.keys().cloned().collect());
+    let head = rows.first().map_or(Vec::new(), |row| {
+        row.keys().map(|key| key.replace('_', " ")).collect()
+    });
     let cell = |value: &serde_json::Value| match (value.as_u64(), value.as_f64(), value.as_str()) {
         (Some(n), _, _) => Cell {
             text: n.to_string(),

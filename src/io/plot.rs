@@ -80,6 +80,16 @@ fn layout(figure: &Figure, plots: &[Plot]) -> Layout {
         .with_label_size(13)
         .with_tick_size(12)
         .with_body_size(12);
+    if let Content::Boxes(boxes) = &figure.content {
+        // Whiskers leave outliers outside the axis that the crate would choose.
+        let values = boxes.iter().flat_map(|(_, values)| values);
+        let (low, high) = values.fold((0.0f64, 0.0f64), |(low, high), v| {
+            (low.min(*v), high.max(*v))
+        });
+        layout = layout
+            .with_y_axis_min(1.05 * low)
+            .with_y_axis_max(1.05 * high);
+    }
     if figure.x.log {
         layout = layout.with_log_x().with_x_tick_format(plain_ticks());
     }
@@ -146,10 +156,15 @@ fn markers(curve: &Curve, hue: &str) -> ScatterPlot {
     }
 }
 
+/// Pale boxes, so that the scans' points show on them.
 fn boxplot(boxes: &[(String, Vec<f64>)]) -> Plot {
     let plot = boxes.iter().fold(BoxPlot::new(), |plot, (label, values)| {
         plot.with_group(label.clone(), values.clone())
     });
-    let colors = (0..boxes.len()).map(|i| HUES[(i + 6) % HUES.len()]);
-    Plot::Box(plot.with_group_colors(colors).with_swarm_overlay())
+    Plot::Box(
+        plot.with_color("#9dbcd4")
+            .with_swarm_overlay()
+            .with_overlay_color("#1b1b1b")
+            .with_overlay_size(2.5),
+    )
 }

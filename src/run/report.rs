@@ -5,6 +5,7 @@ use crate::io::html::{self, ScanPage, Source};
 use crate::io::specimen::{self, SegmentRecord};
 use crate::io::{atomic, markdown, plot, table};
 use crate::measure::row::Row;
+use crate::recipe::Recipe;
 use crate::run::host;
 use crate::run::session::Session;
 use crate::stage::report::{Report, ReportParams, report as assemble};
@@ -24,7 +25,11 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
     let recipe = dirs
         .iter()
         .find_map(|dir| std::fs::read_to_string(dir.join(RECIPE)).ok());
-    write(&rows, &ReportParams::default(), dirs, recipe, out, session)
+    let params = recipe
+        .as_deref()
+        .and_then(|text| Recipe::parse(text, Path::new(RECIPE)).ok())
+        .map_or_else(ReportParams::default, |recipe| recipe.report);
+    write(&rows, &params, dirs, recipe, out, session)
 }
 
 fn results_file(dir: &Path) -> Result<PathBuf> {

@@ -28,6 +28,8 @@ pub struct Selection {
     pub recursive: bool,
     /// Only scans whose file or folder name matches (`*` and `?`).
     pub pattern: Option<Pattern>,
+    /// Only the scan of this name: one job of many on a cluster.
+    pub only: Option<String>,
 }
 
 /// The scans under `inputs`, each with the recipe's settings or its manifest's.
@@ -56,6 +58,16 @@ pub fn find(
         }));
     }
     refuse_doubles(&jobs)?;
+    if let Some(only) = &selection.only {
+        jobs.retain(|job| job.name == *only);
+        if jobs.is_empty() {
+            return Err(Error::setting(
+                "--only",
+                format!("no scan is named {only}"),
+                "list the names with --dry-run",
+            ));
+        }
+    }
     Ok(jobs)
 }
 
@@ -212,7 +224,7 @@ mod tests {
         assert_eq!(find_names(&[root.join("s10")], &plain).unwrap(), ["s10"]);
         let deep = Selection {
             recursive: true,
-            pattern: None,
+            ..Selection::default()
         };
         assert_eq!(
             find_names(std::slice::from_ref(&root), &deep).unwrap(),
@@ -221,6 +233,7 @@ mod tests {
         let gz = Selection {
             recursive: true,
             pattern: Some(Pattern::new("*.gz").unwrap()),
+            only: None,
         };
         assert_eq!(find_names(&[root], &gz).unwrap(), ["s2"]);
     }

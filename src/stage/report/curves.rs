@@ -175,7 +175,11 @@ fn finest<'a, 'b>(members: &[&'b Solved<'a>]) -> Vec<&'b Solved<'a>> {
 /// Wall time against lattice parameter: the median over scans, bars from the fastest to the slowest.
 pub fn wall_time(rows: &[Row]) -> Option<Figure> {
     let mut solved = solved(rows);
-    solved.retain(|s| s.family.model != Model::Ffb && s.row.wall_s.is_some_and(|t| t > 0.0));
+    solved.retain(|s| {
+        s.row.sites != Some(0)
+            && s.family.model != Model::Ffb
+            && s.row.wall_s.is_some_and(|t| t > 0.0)
+    });
     let curves = curves(&solved, Mark::Joined, |members| {
         let mut sizes = distinct(members.iter().map(|s| s.row.lp_mm));
         sizes.sort_by(f64::total_cmp);

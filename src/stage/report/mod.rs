@@ -53,23 +53,38 @@ pub fn report(rows: &[Row], params: &ReportParams) -> Report {
         lines: table::lines(rows),
         statistics: statistics::statistics(&samples),
         figures,
-        notes: rows.iter().filter_map(note).collect(),
+        notes: notes(rows),
     }
 }
 
-fn note(row: &Row) -> Option<String> {
+/// One note per scan and matter, with the rows it is about.
+fn notes(rows: &[Row]) -> Vec<String> {
+    let found: Vec<(&str, String, String)> = rows.iter().filter_map(note).collect();
+    let matters = distinct(found.iter().map(|(scan, words, _)| (*scan, words)));
+    let one = |(scan, words): (&str, &String)| {
+        let about: Vec<&str> = found
+            .iter()
+            .filter(|(s, w, _)| *s == scan && w == words)
+            .map(|(_, _, row)| row.as_str())
+            .collect();
+        format!("{scan}: {words} ({})", about.join(", "))
+    };
+    matters.into_iter().map(one).collect()
+}
+
+/// Scan, what is to be known, which row.
+fn note(row: &Row) -> Option<(&str, String, String)> {
     let model = Model::of(row)?;
     let words = match (&row.note, row.converged) {
         (Some(note), _) => note.clone(),
         (None, Some(false)) => "not converged".to_owned(),
         (None, _) => return None,
     };
-    Some(format!(
-        "{}, {} {} at {} mm: {words}",
-        row.scan,
-        row.structure,
-        model.name(),
-        row.lp_mm
+    let structure = row.structure.to_uppercase();
+    Some((
+        &row.scan,
+        words,
+        format!("{structure} {} {} mm", model.name(), row.lp_mm),
     ))
 }
 
@@ -192,7 +207,7 @@ mod tests {
             ..row("a", "floppy", 0.1, 30.0)
         };
         let report = report(&[stalled], &ReportParams::default());
-        assert_eq!(report.notes, ["a, sc floppy at 0.1 mm: not converged"]);
+        assert_eq!(report.notes, ["a: not converged (SC floppy 0.1 mm)"]);
     }
 
     #[test]

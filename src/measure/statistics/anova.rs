@@ -33,6 +33,11 @@ pub fn repeated_measures(values: &[Vec<f64>]) -> Option<Anova> {
         .flat_map(|m| (0..n).map(move |s| (m, s)))
         .map(|(m, s)| square(values[m][s] - method[m] - specimen[s] + grand))
         .sum();
+    let total: f64 = values.iter().flatten().map(|v| square(v - grand)).sum();
+    // Squares of rounding errors are some 1e-32 of the squares of the values.
+    if error <= 1e-28 * total {
+        return None;
+    }
     let (df_methods, df_error) = (k - 1, (k - 1) * (n - 1));
     let f = (between / df_methods as f64) / (error / df_error as f64);
     let fisher = FisherSnedecor::new(df_methods as f64, df_error as f64).ok()?;

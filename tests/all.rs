@@ -10,5 +10,6 @@ mod patch;
 mod phantom;
 mod pipelines;
 mod remodelling;
+mod scenes;
 mod segment;
 mod voxel_fe;

@@ -96,7 +96,7 @@ pub fn run() -> Result<Outcome> {
         Verb::Run(args) => run::run(args, &session, json),
         Verb::Phantom(args) => phantom::run(args, &session, json),
         Verb::Info(args) => info::run(args, json),
-        Verb::Scene(args) => scene::run(args, &session),
+        Verb::Scene(args) => scene::run(args, &session, json),
         Verb::Completions(args) => completions::run(args),
     }
 }

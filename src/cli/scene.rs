@@ -1,5 +1,6 @@
 //! `scene`: two-dimensional pair-potential scenes.
 
+use super::print_json;
 use bonepd_ct::error::Result;
 use bonepd_ct::run::Outcome;
 use bonepd_ct::run::session::Session;
@@ -16,6 +17,10 @@ pub struct SceneArgs {
     out: PathBuf,
 }
 
-pub fn run(args: &SceneArgs, session: &Session) -> Result<Outcome> {
-    bonepd_ct::run::scene::scene(&args.scene, &args.out, session)
+pub fn run(args: &SceneArgs, session: &Session, json: bool) -> Result<Outcome> {
+    let (outcome, record) = bonepd_ct::run::scene::scene(&args.scene, &args.out, session)?;
+    if let Some(record) = record.filter(|_| json) {
+        print_json(&record);
+    }
+    Ok(outcome)
 }

@@ -199,13 +199,15 @@ fn glyph(c: char) -> [u8; 7] {
         'z' => [0, 0, 31, 2, 4, 8, 31],
         'm' => [0, 0, 26, 21, 21, 21, 21],
         '=' => [0, 0, 31, 0, 31, 0, 0],
+        '-' => [0, 0, 0, 31, 0, 0, 0],
+        't' => [8, 8, 28, 8, 8, 9, 6],
         '.' => [0, 0, 0, 0, 0, 12, 12],
         _ => [0; 7],
     }
 }
 
 /// Text at twice the glyphs' size, 12 pixels a character; what does not fit is cut.
-fn write_text(picture: &mut RgbImage, [left, top]: [u32; 2], text: &str) {
+pub(crate) fn write_text(picture: &mut RgbImage, [left, top]: [u32; 2], text: &str) {
     for (i, c) in text.chars().enumerate() {
         for (row, bits) in glyph(c).into_iter().enumerate() {
             for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {

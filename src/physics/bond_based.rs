@@ -82,25 +82,16 @@ impl BondBased {
         }
     }
 
-    /// Weighted energy density Ψ of a material point (eq 11).
-    pub fn energy(&self, values: &[f64], a: usize) -> f64 {
-        let bonds = self.family.of(a);
-        0.5 * bonds
-            .map(|(i, b)| {
-                let p = self.pair(values, a, i, b);
-                p.weight * p.energy
-            })
-            .sum::<f64>()
-    }
-
-    /// Force density on a material point (eq 20 before it is set to zero).
-    pub fn force(&self, values: &[f64], a: usize) -> [f64; 2] {
-        let mut f = [0.0; 2];
+    /// Weighted energy density Ψ of a material point (eq 11) and the force density on it (eq 20 before it is set to
+    /// zero).
+    pub fn state(&self, values: &[f64], a: usize) -> (f64, [f64; 2]) {
+        let (mut energy, mut force) = (0.0, [0.0; 2]);
         for (i, b) in self.family.of(a) {
             let p = self.pair(values, a, i, b);
-            (0..2).for_each(|d| f[d] += p.weight * p.pull * p.xi[d]);
+            energy += 0.5 * p.weight * p.energy;
+            (0..2).for_each(|d| force[d] += p.weight * p.pull * p.xi[d]);
         }
-        f
+        (energy, force)
     }
 
     /// Entries of `∂R/∂q`: those of each unknown's own point and of its family.
@@ -147,19 +138,17 @@ impl Step<'_> {
         values
     }
 
-    fn equation(&self, values: &[f64], value: usize) -> f64 {
+    fn equation(&self, state: &[(f64, [f64; 2])], values: &[f64], value: usize) -> f64 {
         let model = self.model;
-        let a = model.point_of(value);
-        if value >= model.points {
-            return model.force(values, a)[(value - model.points) % 2];
-        }
-        match &model.growth {
-            Some(growth) => {
+        let (energy, force) = state[model.point_of(value)];
+        match (value.checked_sub(model.points), &model.growth) {
+            (Some(place), _) => force[place % 2],
+            (None, Some(growth)) => {
                 growth
-                    .balance(values[a], self.old[a], model.energy(values, a), self.dt)
+                    .balance(values[value], self.old[value], energy, self.dt)
                     .residual
             }
-            None => 0.0,
+            (None, None) => 0.0,
         }
     }
 
@@ -171,7 +160,7 @@ impl Step<'_> {
         let balance = growth.balance(
             values[a],
             self.old[a],
-            self.model.energy(values, a),
+            self.model.state(values, a).0,
             self.dt,
         );
         add(row, balance.by_density);
@@ -225,10 +214,14 @@ impl Step<'_> {
 impl Nonlinear for Step<'_> {
     fn residual(&self, q: &[f64], r: &mut [f64]) {
         let values = self.expand(q);
-        r.par_iter_mut()
-            .enumerate()
+        let state: Vec<_> = (0..self.model.family.rows())
+            .into_par_iter()
             .with_min_len(64)
-            .for_each(|(row, r)| *r = self.equation(&values, self.map.equation(row)));
+            .map(|a| self.model.state(&values, a))
+            .collect();
+        for (row, r) in r.iter_mut().enumerate() {
+            *r = self.equation(&state, &values, self.map.equation(row));
+        }
     }
 
     fn tangent(&self, q: &[f64], k: &mut Sparse) {

@@ -210,7 +210,8 @@ impl Continuum {
             } else {
                 2.0 * rho
             };
-            if (next - rho).abs() <= 1e-15 * rho {
+            // Newton is quadratic: after a change this small the next is rounding.
+            if (next - rho).abs() <= 1e-9 * rho {
                 return next;
             }
             rho = next;

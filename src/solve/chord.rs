@@ -73,10 +73,7 @@ impl Chord {
                 return Err(NotConverged::Diverged { error: done.error });
             }
             if !self.ready || (done.error > SLOW * before && !fresh) {
-                equations.stiffness(q, &mut self.stiffness);
-                let factor = self.llt.factorize(&self.stiffness);
-                self.ready = factor.is_ok();
-                factor.map_err(|_| NotConverged::Singular)?;
+                self.renew(equations, q)?;
                 done.factorisations += 1;
                 fresh = true;
             } else {
@@ -85,6 +82,29 @@ impl Chord {
             self.update(equations, q, &mut r, &diagonal);
             done.iterations += 1;
         }
+    }
+
+    /// The response of the unknowns that are not local to the residual `r`, at `q`, in place; local ones stay.
+    pub fn respond(
+        &mut self,
+        equations: &impl Staggered,
+        q: &[f64],
+        r: &mut [f64],
+    ) -> Result<(), NotConverged> {
+        if !self.ready {
+            self.renew(equations, q)?;
+        }
+        let (local, placements) = r.split_at_mut(equations.local());
+        local.fill(0.0);
+        self.llt.solve(placements);
+        Ok(())
+    }
+
+    fn renew(&mut self, equations: &impl Staggered, q: &[f64]) -> Result<(), NotConverged> {
+        equations.stiffness(q, &mut self.stiffness);
+        let factor = self.llt.factorize(&self.stiffness);
+        self.ready = factor.is_ok();
+        factor.map_err(|_| NotConverged::Singular)
     }
 
     /// Local unknowns first, then the others with the residual those leave.

@@ -67,4 +67,19 @@ impl Newton {
             q.iter_mut().zip(&r).for_each(|(q, dq)| *q += share * dq);
         }
     }
+
+    /// `−(∂R/∂q)⁻¹ r` at `q`, in place.
+    pub fn respond(
+        &mut self,
+        equations: &impl Nonlinear,
+        q: &[f64],
+        r: &mut [f64],
+    ) -> Result<(), NotConverged> {
+        equations.tangent(q, &mut self.tangent);
+        let factor = self.lu.factorize(&self.tangent);
+        factor.map_err(|_| NotConverged::Singular)?;
+        self.lu.solve(r);
+        r.iter_mut().for_each(|v| *v = -*v);
+        Ok(())
+    }
 }

@@ -73,6 +73,9 @@ pub struct Slice {
     pub index: usize,
     #[serde(default)]
     pub axis: crate::grid::Axis,
+    /// The scan itself, for densities from grey values.
+    #[serde(default)]
+    pub grey: Option<PathBuf>,
 }
 
 /// Pixels read for [`Outline::Image`] or [`Outline::Slice`]: rows from the bottom up, x fastest.

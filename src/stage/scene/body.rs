@@ -19,6 +19,8 @@ pub struct Body {
     held: Vec<(usize, f64, usize)>,
     /// Material points on a loaded edge itself: they move with it.
     on_edge: Vec<(usize, Edge)>,
+    /// Centre and size of the material along each axis.
+    extents: [(f64, f64); 2],
     holds: Vec<Hold>,
     /// Initial density of every point.
     density: Vec<f64>,
@@ -65,12 +67,14 @@ impl Body {
             layers: conditions.layers.cloned(),
             held: Vec::new(),
             on_edge: Vec::new(),
+            extents: [(0.0, 0.0); 2],
             holds: conditions.holds.to_vec(),
             density,
             points,
         };
         body.held = body.find_held()?;
         body.on_edge = body.edge_rows(on_edges);
+        body.extents = [body.extent(0), body.extent(1)];
         body.map = Reduction::new(&body.roles(conditions.grows));
         body.require_support()?;
         Ok(body)
@@ -165,7 +169,7 @@ impl Body {
             let rest = self.points.position(p);
             given[self.placement(p, axis)] = match layers.normal {
                 Normal::Affine => {
-                    let (centre, size) = self.extent(axis);
+                    let (centre, size) = self.extents[axis];
                     centre + (rest[axis] - centre) * (1.0 + 2.0 * u / size)
                 }
                 Normal::Rigid => rest[axis] + sign as f64 * u,
@@ -243,61 +247,25 @@ impl Body {
             .collect()
     }
 
-    /// Carries placements over a change of the conditions between two times: the affine stretch that layers impose
-    /// (with lateral contraction by ν = 1/3), or the displacements scaled with proportional holds.
-    pub fn predict(&self, q: &mut [f64], before: f64, now: f64) {
-        if let Some(layers) = &self.layers {
-            let axis = layers.edges[0].normal().0;
-            let (u0, u1) = (layers.displacement.at(before), layers.displacement.at(now));
-            let size = self.extent(axis).1;
-            let along = (1.0 + 2.0 * u1 / size) / (1.0 + 2.0 * u0 / size);
-            let across = 1.0 - 2.0 / 3.0 * (u1 - u0) / size;
-            self.scale(
-                q,
-                |a, _| if a == axis { along } else { across },
-                |a| self.extent(a).0,
-            );
-        } else if let Some(ratio) = self.hold_ratio(before, now) {
-            self.stretch_displacements(q, ratio);
-        }
-    }
-
-    fn scale(
-        &self,
-        q: &mut [f64],
-        factor: impl Fn(usize, f64) -> f64,
-        centre: impl Fn(usize) -> f64,
-    ) {
+    /// Carries placements over a change of the layers between two times: the affine stretch they impose, with lateral
+    /// contraction by ν = 1/3. False where there are no layers.
+    pub fn stretch(&self, q: &mut [f64], before: f64, now: f64) -> bool {
+        let Some(layers) = &self.layers else {
+            return false;
+        };
+        let axis = layers.edges[0].normal().0;
+        let (u0, u1) = (layers.displacement.at(before), layers.displacement.at(now));
+        let size = self.extents[axis].1;
+        let along = (1.0 + 2.0 * u1 / size) / (1.0 + 2.0 * u0 / size);
+        let across = 1.0 - 2.0 / 3.0 * (u1 - u0) / size;
         for (k, q) in q.iter_mut().enumerate() {
             if let Some(place) = self.map.equation(k).checked_sub(self.points.len()) {
-                let (axis, c) = (place % 2, centre(place % 2));
-                *q = c + (*q - c) * factor(axis, *q);
+                let centre = self.extents[place % 2].0;
+                let factor = if place % 2 == axis { along } else { across };
+                *q = centre + (*q - centre) * factor;
             }
         }
-    }
-
-    fn stretch_displacements(&self, q: &mut [f64], ratio: f64) {
-        for (k, q) in q.iter_mut().enumerate() {
-            if let Some(place) = self.map.equation(k).checked_sub(self.points.len()) {
-                let rest = self.points.position(place / 2)[place % 2];
-                *q = rest + (*q - rest) * ratio;
-            }
-        }
-    }
-
-    /// The factor all held displacements change by, if they share one.
-    fn hold_ratio(&self, before: f64, now: f64) -> Option<f64> {
-        let moving = self
-            .holds
-            .iter()
-            .map(|h| (h.value.at(before), h.value.at(now)));
-        let mut ratios = moving
-            .filter(|&(a, b)| a != 0.0 || b != 0.0)
-            .map(|(a, b)| b / a);
-        let first = ratios.next().filter(|r| r.is_finite())?;
-        ratios
-            .all(|r| (r - first).abs() < 1e-9 * first.abs())
-            .then_some(first)
+        true
     }
 
     /// Refuses a body that could move or turn as a whole.
@@ -335,6 +303,22 @@ fn check_layers(layers: &Layers) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Share of a change of given values by which the response to it is measured.
+pub const NUDGE: f64 = 1e-3;
+
+/// Given values a small share on the way between two states.
+pub fn nudge(from: &[f64], to: &[f64]) -> Vec<f64> {
+    from.iter()
+        .zip(to)
+        .map(|(a, b)| a + NUDGE * (b - a))
+        .collect()
+}
+
+/// How unknowns moved, per unit of time.
+pub fn rate_of(before: &[f64], now: &[f64], dt: f64) -> Vec<f64> {
+    now.iter().zip(before).map(|(b, a)| (b - a) / dt).collect()
 }
 
 /// 0 for "x", 1 for "y".

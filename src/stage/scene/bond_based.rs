@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::physics::bond_based::{BondBased, Step, micromodulus_continuous, micromodulus_discrete};
 use crate::physics::growth::Weight;
 use crate::solve::newton::NotConverged;
-use crate::stage::scene::body::{Body, Conditions};
+use crate::stage::scene::body::{Body, Conditions, NUDGE, nudge, rate_of};
 use crate::stage::scene::density::{DensityParams, GrowthParams, Probes};
 use crate::stage::scene::frame::{Frame, Observer, Summary};
 use crate::stage::scene::march::{Advance, Marching, march};
@@ -161,24 +161,30 @@ impl Peridynamic {
 impl Marching for Peridynamic {
     fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged> {
         let given = self.body.given(now);
-        let step = Step {
+        let held = self.body.given(before);
+        let old = &self.values[..self.body.material];
+        let nudged = nudge(&held, &given);
+        let step = |given| Step {
             model: &self.model,
             map: &self.body.map,
-            given: &given,
-            old: &self.values[..self.body.material],
+            given,
+            old,
             dt: now - before,
         };
         let mut q = self.q.clone();
-        self.body.predict(&mut q, before, now);
-        let advance = self
-            .solver
-            .solve(&step, &mut q, self.rate.as_deref(), now - before)?;
-        self.rate = Some(
-            q.iter()
-                .zip(&self.q)
-                .map(|(new, old)| (new - old) / (now - before))
-                .collect(),
-        );
+        let moved = given != held;
+        if moved && !self.body.stretch(&mut q, before, now) {
+            self.solver
+                .predict(&step(&held), &step(&nudged), NUDGE, &mut q)?;
+        }
+        let rate = self
+            .rate
+            .as_deref()
+            .filter(|_| !moved)
+            .map(|r| (r, now - before));
+        let advance = self.solver.solve(&step(&given), &mut q, rate)?;
+        // What a change of the supports moved does not go on.
+        self.rate = (!moved).then(|| rate_of(&self.q, &q, now - before));
         self.q = q;
         self.body.map.expand(&self.q, &given, &mut self.values);
         Ok(advance)

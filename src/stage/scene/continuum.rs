@@ -6,7 +6,7 @@ use crate::physics::continuum::{Continuum, Old, Step};
 use crate::physics::growth::Weight;
 use crate::physics::hyperelastic::Energy;
 use crate::solve::newton::NotConverged;
-use crate::stage::scene::body::{Body, Conditions, axis_of};
+use crate::stage::scene::body::{Body, Conditions, NUDGE, axis_of, nudge, rate_of};
 use crate::stage::scene::density::{DensityParams, GrowthParams, Probes};
 use crate::stage::scene::frame::{Frame, Observer, Summary};
 use crate::stage::scene::march::{Advance, Marching, march};
@@ -267,26 +267,33 @@ fn require_elements(model: &Continuum) -> Result<()> {
 impl Marching for Local {
     fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged> {
         let given = self.body.given(now);
+        let held = self.body.given(before);
         let load = self.loads.at(now, given.len());
-        let step = Step {
+        let loads_move = load != self.loads.at(before, given.len());
+        let nudged = nudge(&held, &given);
+        let step = |given| Step {
             model: &self.model,
             map: &self.body.map,
-            given: &given,
+            given,
             old: &self.old,
             dt: now - before,
             load: &load,
         };
         let mut q = self.q.clone();
-        self.body.predict(&mut q, before, now);
-        let advance = self
-            .solver
-            .solve(&step, &mut q, self.rate.as_deref(), now - before)?;
-        self.rate = Some(
-            q.iter()
-                .zip(&self.q)
-                .map(|(new, old)| (new - old) / (now - before))
-                .collect(),
-        );
+        let moved = given != held;
+        if moved {
+            self.solver
+                .predict(&step(&held), &step(&nudged), NUDGE, &mut q)?;
+        }
+        let steady = !moved && !loads_move;
+        let rate = self
+            .rate
+            .as_deref()
+            .filter(|_| steady)
+            .map(|r| (r, now - before));
+        let advance = self.solver.solve(&step(&given), &mut q, rate)?;
+        // What a change of supports or loads moved does not go on.
+        self.rate = steady.then(|| rate_of(&self.q, &q, now - before));
         self.q = q;
         self.body.map.expand(&self.q, &given, &mut self.values);
         self.old = match &self.old {

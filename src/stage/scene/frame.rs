@@ -20,6 +20,8 @@ pub struct Output {
     pub animation: bool,
     /// Also a series for ParaView.
     pub vtk: bool,
+    /// Output folder of another scene on the same points, relative to this file: maps of the difference to it.
+    pub minus: Option<std::path::PathBuf>,
 }
 
 impl Output {

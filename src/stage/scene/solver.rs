@@ -75,14 +75,34 @@ impl Equilibrium {
         })
     }
 
-    /// Solves a step from the guess `q`. `rate` is how the unknowns moved before, per unit of time: the reusing method
-    /// starts from where they would go on to.
+    /// Moves the unknowns with a change of the given values, to first order: `to` are the equations with a small `share`
+    /// of the change, `from` those without it. The factor is that of the state before, where the body is at rest.
+    pub fn predict(
+        &mut self,
+        from: &impl Staggered,
+        to: &impl Staggered,
+        share: f64,
+        q: &mut [f64],
+    ) -> Result<(), NotConverged> {
+        let (mut r0, mut r1) = (vec![0.0; q.len()], vec![0.0; q.len()]);
+        from.residual(q, &mut r0);
+        to.residual(q, &mut r1);
+        let mut dq: Vec<f64> = r1.iter().zip(&r0).map(|(b, a)| (b - a) / share).collect();
+        match self {
+            Equilibrium::Newton(newton) => newton.respond(from, q, &mut dq)?,
+            Equilibrium::Chord(chord) => chord.respond(from, q, &mut dq)?,
+        }
+        q.iter_mut().zip(&dq).for_each(|(q, dq)| *q += dq);
+        Ok(())
+    }
+
+    /// Solves a step from the guess `q`. `rate` is how the unknowns moved before, per unit of time, and the time
+    /// step: the reusing method starts from where they would go on to.
     pub fn solve(
         &mut self,
         step: &impl Staggered,
         q: &mut [f64],
-        rate: Option<&[f64]>,
-        dt: f64,
+        rate: Option<(&[f64], f64)>,
     ) -> Result<Advance, NotConverged> {
         match self {
             Equilibrium::Newton(newton) => {
@@ -96,7 +116,7 @@ impl Equilibrium {
                 })
             }
             Equilibrium::Chord(chord) => {
-                if let Some(rate) = rate {
+                if let Some((rate, dt)) = rate {
                     q.iter_mut().zip(rate).for_each(|(q, v)| *q += v * dt);
                 }
                 let done = chord.solve(step, q)?;

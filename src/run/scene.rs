@@ -102,6 +102,7 @@ fn read_inputs(scene: &mut Scene, folder: &Path) -> Result<Inputs> {
             Ok(Inputs {
                 bitmap: Some(Bitmap { n, inside }),
                 grey: Some(values),
+                ..Inputs::default()
             })
         }
         Outline::Slice(slice) => {
@@ -125,6 +126,7 @@ fn read_inputs(scene: &mut Scene, folder: &Path) -> Result<Inputs> {
             Ok(Inputs {
                 bitmap: Some(Bitmap { n, inside }),
                 grey,
+                ..Inputs::default()
             })
         }
         _ => Ok(Inputs::default()),

@@ -17,8 +17,6 @@ pub mod segment;
 pub mod session;
 pub mod solve;
 
-use crate::error::Error;
-
 /// How a command ended when nothing stopped it. Everything else is an [`Error`] (exit 2).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Outcome {
@@ -27,13 +25,4 @@ pub enum Outcome {
     NotConverged,
     /// Names of the scans that failed; the others are done.
     SomeFailed(Vec<String>),
-}
-
-/// For what the command line knows and this version cannot do yet.
-pub(crate) fn not_available(what: &str) -> Error {
-    Error::setting(
-        what,
-        "not available in this version",
-        "see `bonepd-ct --help` for what is",
-    )
 }

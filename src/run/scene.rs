@@ -162,6 +162,9 @@ fn read_slice(path: &Path, axis: usize, index: usize) -> Result<([usize; 2], Vec
     Ok((size, slice.collect()))
 }
 
+/// Scalar fields by name.
+type Scalars = Vec<(&'static str, Vec<f64>)>;
+
 /// Writes what a scene reports.
 struct Writer<'a> {
     out: &'a Path,
@@ -172,7 +175,7 @@ struct Writer<'a> {
     points: Option<Points>,
     history: Vec<Frame>,
     /// Scalars to draw, by time.
-    maps: Vec<(f64, Vec<(&'static str, Vec<f64>)>)>,
+    maps: Vec<(f64, Scalars)>,
     series: Vec<(PathBuf, f64)>,
 }
 
@@ -239,7 +242,7 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    fn scalars(&self, fields: &[Field]) -> Vec<(&'static str, Vec<f64>)> {
+    fn scalars(&self, fields: &[Field]) -> Scalars {
         let wanted = |name: &str| match self.output.maps.is_empty() {
             true => true,
             false => self.output.maps.iter().any(|m| m == name),

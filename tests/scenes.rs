@@ -86,8 +86,8 @@ fn a_missing_scene_is_refused_and_a_stopped_one_marked() {
         .code(2);
     let text = std::fs::read_to_string(pipelines().join("square-fixed-ratio-10.toml")).unwrap();
     assert!(text.contains("0.0225"));
-    // The second value turns the strip (0.3 high) inside out.
-    let text = text.replace("0.0225", "-0.21");
+    // The second value flattens the strip (0.3 high) to a line.
+    let text = text.replace("0.0225", "-0.15");
     let scene = dir.path().join("scene.toml");
     std::fs::write(
         &scene,

@@ -202,19 +202,18 @@ impl Continuum {
                 high = rho
             }
             let newton = rho - r / slope;
+            // Newton is quadratic: after a change this small the next is rounding, which must not reach the bracket.
+            if (newton - rho).abs() <= 1e-10 * rho {
+                return newton;
+            }
             let inside = low < newton && newton < high;
-            let next = if inside {
+            rho = if inside {
                 newton
             } else if high.is_finite() {
                 0.5 * (low + high)
             } else {
                 2.0 * rho
             };
-            // Newton is quadratic: after a change this small the next is rounding.
-            if (next - rho).abs() <= 1e-9 * rho {
-                return next;
-            }
-            rho = next;
         }
         rho
     }

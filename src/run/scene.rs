@@ -308,6 +308,7 @@ impl<'a> Writer<'a> {
             .collect();
         let figure = Figure {
             stem: "history".into(),
+            scan: None,
             title: String::new(),
             caption: String::new(),
             x: Axis::linear("time"),

@@ -78,7 +78,7 @@ fn fill(out: &mut impl Write, sites: &Sites) -> std::io::Result<()> {
         let plane = sites.plane(s);
         let kind =
             1 + i32::from(plane <= sites.grips.low) + 2 * i32::from(plane >= sites.grips.high);
-        writeln!(out, "{} 1 {kind} {x:.12} {y:.12} {z:.12}", s + 1)?;
+        writeln!(out, "{} 1 {kind} {x:.16} {y:.16} {z:.16}", s + 1)?;
     }
     writeln!(out, "\nBonds\n")?;
     let mut bond = 0;

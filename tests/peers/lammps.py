@@ -9,7 +9,7 @@ import csv, pathlib, shutil, subprocess, sys, tempfile, time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = ROOT / "target/release/bonepd-ct"
-STRAIN = 4e-7           # tension, and small enough to be linear: under compression floppy lattices buckle at once
+STRAIN = 4e-7           # tension, and small enough to be linear: floppy lattices buckle in compression
 TOLERANCE = 1e-3
 
 SCRIPT = """\
@@ -82,7 +82,7 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         run(PROGRAM, "segment", scan, "-o", folder, *flags)
-        which = ["--structure", "sc,bcc,fcc", "--lp", "0.12", "--boundary", "firm,floppy"]
+        which = ["--structure", "sc,bcc,fcc", "--lp", "0.08", "--boundary", "firm,floppy"]
         run(PROGRAM, "lattice", folder, *which, "--export", "lammps")
         run(PROGRAM, "solve", folder, "--poisson", "0.25", f"--strain={STRAIN}", "--tolerance", "1e-6")
         for row in csv.DictReader((folder / "results.csv").open()):

@@ -5,6 +5,7 @@ pub mod cg;
 pub mod chord;
 pub mod direct;
 pub mod estimate;
+pub mod fallback;
 pub mod jacobi;
 pub mod lanczos;
 pub mod newton;

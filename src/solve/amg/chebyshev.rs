@@ -151,7 +151,7 @@ pub fn largest_eigenvalue<const D: usize>(level: &impl Level<D>) -> f32 {
     largest
 }
 
-const POWER_STEPS: usize = 10;
+const POWER_STEPS: usize = 15;
 
 /// A number between −1 and 1 that looks random, the same on every machine.
 fn noise(i: u32) -> f32 {

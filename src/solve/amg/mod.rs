@@ -56,6 +56,15 @@ impl AmgParams {
             coarsest: 200,
         }
     }
+
+    /// Boxes three lattice parameters wide: struts are few sites thick, and each aggregate should be one stiff piece.
+    pub fn lattice(lp_mm: f64) -> Self {
+        AmgParams {
+            box_mm: [3.0 * lp_mm; 3],
+            degrees: [2, 2],
+            coarsest: 100,
+        }
+    }
 }
 
 /// `z ≈ A⁻¹ r` by one symmetric V-cycle.

@@ -4,11 +4,13 @@ use crate::error::{Error, Result};
 use crate::measure::apparent::Loaded;
 use crate::measure::row::Row;
 use crate::operator::Operator;
-use crate::operator::held::{Constrained, Held};
+use crate::operator::held::Held;
 use crate::par::sum_chunks;
+use crate::physics::lattice::multigrid::Springs;
 use crate::physics::lattice::{self, Lattice};
-use crate::solve::cg::{CgInfo, CgParams, CgStep, minimise};
-use crate::solve::jacobi::Jacobi;
+use crate::solve::amg::{Amg, AmgParams};
+use crate::solve::cg::{CgInfo, CgParams, CgStep};
+use crate::solve::fallback::minimise_or_fall_back;
 use crate::stage::lattice::{Boundary, Case, build};
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::{Ends, Load, SolveParams};
@@ -56,11 +58,10 @@ pub fn solve_lattice(
         max_iterations: params.max_iterations,
         ..CgParams::default()
     };
-    let preconditioner = Jacobi::new(&Constrained {
-        inner: &model,
-        held: &held,
-    });
-    let info = minimise(&model, &held, &preconditioner, &mut u, &cg, observe);
+    let springs = Springs::new(&model);
+    let amg = Amg::new(&springs, &held, &AmgParams::lattice(case.lp_mm));
+    let info = minimise_or_fall_back(&model, &held, &amg, &mut u, &cg, observe);
+    drop(amg);
     Ok(Solved {
         sites: sites.len(),
         dropped: sites.dropped,

@@ -12,7 +12,8 @@ use crate::physics::hex8::Hex8;
 use crate::physics::hex8::element::Integration;
 use crate::physics::hex8::graded::Graded;
 use crate::solve::amg::{Amg, AmgParams};
-use crate::solve::cg::{CgInfo, CgParams, CgStep, minimise};
+use crate::solve::cg::{CgInfo, CgParams, CgStep};
+use crate::solve::fallback::minimise_or_fall_back;
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::{Ends, Load, SolveParams};
 use crate::topology::voxels::{Planes, VoxelMesh};
@@ -112,7 +113,7 @@ fn solve_model(
         ..CgParams::default()
     };
     let preconditioner = Amg::new(model, &held, &AmgParams::new(mesh.grid.spacing_mm));
-    let info = minimise(model, &held, &preconditioner, &mut u, &cg, observe);
+    let info = minimise_or_fall_back(model, &held, &preconditioner, &mut u, &cg, observe);
     drop(preconditioner);
     Solved {
         sites: mesh.elements,

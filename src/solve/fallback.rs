@@ -1,0 +1,91 @@
+//! Owns what to do when a strong preconditioner is found not to be positive: carry on with the diagonal one.
+
+use crate::operator::held::{Constrained, Held};
+use crate::operator::{Operator, Preconditioner};
+use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, minimise};
+use crate::solve::jacobi::Jacobi;
+
+/// [`minimise`] with `preconditioner`; should that break down, from where it came to with the diagonal. Iterations are
+/// those of both.
+pub fn minimise_or_fall_back<const D: usize>(
+    operator: &impl Operator<D>,
+    held: &Held,
+    preconditioner: &impl Preconditioner<D>,
+    u: &mut [[f64; D]],
+    params: &CgParams,
+    mut observe: impl FnMut(CgStep),
+) -> CgInfo {
+    let first = minimise(operator, held, preconditioner, u, params, &mut observe);
+    if first.ended != Ended::Breakdown {
+        return first;
+    }
+    let diagonal = Jacobi::new(&Constrained {
+        inner: operator,
+        held,
+    });
+    let left = CgParams {
+        max_iterations: params.max_iterations.saturating_sub(first.iterations),
+        ..*params
+    };
+    let second = minimise(operator, held, &diagonal, u, &left, |step| {
+        observe(CgStep {
+            iteration: first.iterations + step.iteration,
+            ..step
+        });
+    });
+    CgInfo {
+        iterations: first.iterations + second.iterations,
+        residual: first.residual * second.residual,
+        ..second
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Chain;
+
+    impl Operator<1> for Chain {
+        fn sites(&self) -> usize {
+            50
+        }
+        fn apply(&self, x: &[[f64; 1]], y: &mut [[f64; 1]]) {
+            for i in 0..50 {
+                let left = if i > 0 { x[i - 1][0] } else { x[i][0] };
+                let right = if i < 49 { x[i + 1][0] } else { x[i][0] };
+                y[i][0] = 2.0 * x[i][0] - left - right;
+            }
+        }
+        fn diagonal(&self, d: &mut [[f64; 1]]) {
+            d.fill([2.0]);
+        }
+    }
+
+    struct Indefinite;
+
+    impl Preconditioner<1> for Indefinite {
+        fn apply(&self, r: &[[f64; 1]], z: &mut [[f64; 1]]) {
+            for (i, (r, z)) in r.iter().zip(z).enumerate() {
+                z[0] = if i < 25 { r[0] } else { -2.0 * r[0] };
+            }
+        }
+    }
+
+    #[test]
+    fn an_indefinite_preconditioner_does_not_cost_the_result() {
+        let mut held = Held::none(50);
+        held.hold(0, 0);
+        held.hold(49, 0);
+        let mut u = vec![[0.0]; 50];
+        u[49][0] = 1.0;
+        let params = CgParams {
+            energy_tolerance: 1e-12,
+            ..CgParams::default()
+        };
+        let info = minimise_or_fall_back(&Chain, &held, &Indefinite, &mut u, &params, |_| ());
+        assert!(info.ended.converged());
+        // A chain of 49 unit springs stretched by 1: energy uᵀAu = 1/49.
+        assert!((info.energy * 49.0 - 1.0).abs() < 1e-10, "{info:?}");
+    }
+}

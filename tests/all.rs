@@ -1,8 +1,10 @@
 //! One test program. Each module is one subject.
 
+mod apparent;
 mod cli;
 mod cohort;
 mod formats;
+mod exports;
 mod laws;
 mod layers;
 mod molecular;

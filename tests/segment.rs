@@ -7,7 +7,7 @@ use bonepd_ct::volume::Volume;
 use std::path::{Path, PathBuf};
 
 /// 200 slices of real bone, not part of the repository.
-fn shared_stack() -> Option<PathBuf> {
+pub fn shared_stack() -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lhdl_3155_D_4_bc");
     if path.is_dir() {
         return Some(path);

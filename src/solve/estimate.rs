@@ -7,8 +7,8 @@
 /// rest of the geometric series that their sums begin; the worse of a short and a long window counts.
 #[derive(Debug, Clone, Default)]
 pub struct EnergyTail {
-    /// Sums of the decreases up to each iteration.
-    cumulated: Vec<f64>,
+    decreases: Vec<f64>,
+    total: f64,
 }
 
 /// Ratio of neighbouring windows beyond which the series is not extrapolated further: at 0.95 the rest is 19 windows.
@@ -20,18 +20,18 @@ const LEAST_ITERATIONS: usize = 4;
 impl EnergyTail {
     /// Records one iteration's `α_j r_jᵀz_j`.
     pub fn push(&mut self, decrease: f64) {
-        let total = self.total();
-        self.cumulated.push(total + decrease);
+        self.decreases.push(decrease);
+        self.total += decrease;
     }
 
     /// Decrease since the start.
     pub fn total(&self) -> f64 {
-        self.cumulated.last().copied().unwrap_or(0.0)
+        self.total
     }
 
     /// Estimated squared energy norm of the current error; None while too few iterations have been made.
     pub fn estimate(&self) -> Option<f64> {
-        let k = self.cumulated.len();
+        let k = self.decreases.len();
         if k < LEAST_ITERATIONS {
             return None;
         }
@@ -41,10 +41,10 @@ impl EnergyTail {
 
     /// Rest of the geometric series whose two last terms are the sums over the last two windows of length `w`.
     fn rest(&self, w: usize) -> f64 {
-        let k = self.cumulated.len();
-        let at = |i: usize| if i == 0 { 0.0 } else { self.cumulated[i - 1] };
-        let last = at(k) - at(k - w);
-        let before = at(k - w) - at(k - 2 * w);
+        // Summed from the decreases themselves: differences of running totals would end at the totals' rounding.
+        let k = self.decreases.len();
+        let last: f64 = self.decreases[k - w..].iter().sum();
+        let before: f64 = self.decreases[k - 2 * w..k - w].iter().sum();
         if last <= 0.0 {
             return 0.0;
         }

@@ -53,7 +53,7 @@ impl AmgParams {
         AmgParams {
             box_mm: spacing_mm.map(|h| (5.0 * mean).max(h)),
             degrees: [2, 2],
-            coarsest: 200,
+            coarsest: 100,
         }
     }
 

@@ -3,8 +3,8 @@
 mod apparent;
 mod cli;
 mod cohort;
-mod formats;
 mod exports;
+mod formats;
 mod laws;
 mod layers;
 mod molecular;

@@ -221,7 +221,7 @@ fn damaged(sound: &[u8], case: u64) -> Vec<u8> {
     let mut bytes = sound.to_vec();
     for _ in 0..1 + random(&mut state) % 4 {
         // Headers come first: that is where damage is tried most.
-        let reach = if random(&mut state) % 3 == 0 {
+        let reach = if random(&mut state).is_multiple_of(3) {
             bytes.len()
         } else {
             bytes.len().min(600)

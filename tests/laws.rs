@@ -18,13 +18,14 @@ use rand_pcg::Pcg64;
 use std::collections::HashMap;
 
 type Field = Vec<[f64; 3]>;
+type Energy = Box<dyn Fn(&[[f64; 3]]) -> f64>;
 
 /// One row: a model on an irregular specimen.
 struct Model {
     name: String,
     operator: Box<dyn Operator<3>>,
     positions: Field,
-    energy: Box<dyn Fn(&[[f64; 3]]) -> f64>,
+    energy: Energy,
 }
 
 /// A 14³ box of voxels with holes, lumps and free corners, and unequal spacing.

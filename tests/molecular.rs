@@ -212,13 +212,13 @@ fn crack_tip_errors(kept: &Kept, n: f64, m: f64, k: [f64; 2]) -> [f64; 3] {
     let (dx, u) = (1.0 / n, kept.vector("displacement"));
     let r = |i: usize| kept.positions[i][0].hypot(kept.positions[i][1]);
     let (mut near, mut far, mut largest, mut size) = ([0.0; 2], [0.0; 2], 0.0_f64, 0.0_f64);
-    for i in 0..u.len() {
+    for (i, u) in u.iter().enumerate() {
         let exact = tip.displacement(kept.positions[i], k);
         size = size.max(exact[0].hypot(exact[1]));
         if r(i) > 1.0 - m * dx - 0.5 * dx {
             continue;
         }
-        let e = (u[i][0] - exact[0]).hypot(u[i][1] - exact[1]);
+        let e = (u[0] - exact[0]).hypot(u[1] - exact[1]);
         let s = exact[0].hypot(exact[1]);
         near = [near[0] + e * e, near[1] + s * s];
         if r(i) > m * dx {

@@ -609,6 +609,8 @@ fn tangent_errors(step: &impl Staggered, pattern: Sparse, q: &[f64]) -> [f64; 4]
     let (mut worst, mut largest) = ([0.0f64; 4], [0.0f64; 4]);
     let mut dense = vec![vec![0.0; n]; n];
     (0..n).for_each(|row| k.row(row).for_each(|(column, v)| dense[row][column] = v));
+    // Index loops: three arrays are walked by row and column together.
+    #[allow(clippy::needless_range_loop)]
     for column in 0..n {
         let (up, down) = (residual(column, h), residual(column, -h));
         for row in 0..n {

@@ -203,7 +203,7 @@ fn logged_pixel_mm(folder: &Path) -> Option<f64> {
     logs.sort();
     let text = raw::head(logs.first()?, 1 << 20).ok()?;
     let text = String::from_utf8_lossy(&text);
-    let sizes = text.lines().filter_map(|line| {
+    let mut sizes = text.lines().filter_map(|line| {
         line.trim()
             .split_once("Pixel Size (um)=")?
             .1
@@ -212,8 +212,7 @@ fn logged_pixel_mm(folder: &Path) -> Option<f64> {
             .ok()
     });
     sizes
-        .filter(|v| v.is_finite() && *v > 0.0)
-        .last()
+        .rfind(|v| v.is_finite() && *v > 0.0)
         .map(|um| um / 1000.0)
 }
 

@@ -17,7 +17,7 @@ pub mod segment;
 pub mod session;
 pub mod solve;
 
-/// How a command ended when nothing stopped it. Everything else is an [`Error`] (exit 2).
+/// How a command ended when nothing stopped it. Everything else is an [`crate::error::Error`] (exit 2).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Outcome {
     Done,

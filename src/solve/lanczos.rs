@@ -51,7 +51,7 @@ pub fn lowest(
         if basis.len() >= limit {
             break;
         }
-        if basis.len() > 2 * count && basis.len() % 5 == 0 {
+        if basis.len() > 2 * count && basis.len().is_multiple_of(5) {
             let now: Vec<f64> = ritz(&alpha, &beta).0.into_iter().take(count).collect();
             let settled = now.len() == count
                 && previous.len() == count

@@ -94,8 +94,8 @@ impl<const D: usize> Body<D> {
                 let mut own = [0.0; D];
                 for (other, kind, factor) in self.row(p) {
                     let b = &self.blocks[kind];
-                    for d in 0..D {
-                        own[d] += factor * b.own[i][d];
+                    for (d, own) in own.iter_mut().enumerate() {
+                        *own += factor * b.own[i][d];
                         if let Some(c) = below(q, other * D + d) {
                             rows.add(q, c, factor * b.cross[i][d]);
                         }

@@ -7,13 +7,16 @@ use crate::error::{Error, Result};
 use crate::solve::lanczos::{Mode, lowest};
 use crate::stage::scene::frame::{Frame, Observer, Summary};
 
+/// Modes, their shapes at every point, and the number of unknowns.
+type Found<const D: usize> = (Vec<Mode>, Vec<Vec<[f64; D]>>, usize);
+
 /// Frequencies and shapes of the lowest `vibration.modes` modes, rigid ones included. The rotary inertia per volume is
 /// that of a cell, ρ Δ²/6 (the text leaves it open; it vanishes with the grid as it must in a Cauchy body).
 pub fn modes<const D: usize>(
     solid: &Solid<D>,
     vibration: &Vibration,
     setup: &Setup,
-) -> Result<(Vec<Mode>, Vec<Vec<[f64; D]>>, usize)> {
+) -> Result<Found<D>> {
     let Vibration { density, modes } = *vibration;
     if density.is_nan() || density <= 0.0 || modes == 0 {
         return Err(Error::setting(

@@ -14,4 +14,6 @@ mod pipelines;
 mod remodelling;
 mod scenes;
 mod segment;
+mod stiffness;
+mod stopped;
 mod voxel_fe;

@@ -6,7 +6,7 @@ use bonepd_ct::error::{Error, Result};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::run::Outcome;
 use bonepd_ct::run::session::Session;
-use bonepd_ct::stage::solve::{Ends, Load, Method, SolveParams};
+use bonepd_ct::stage::solve::{Conditions, Ends, Load, Method, SolveParams};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -42,12 +42,16 @@ pub struct SolveSettings {
     /// Thickness of each grip in mm; 0 grips the end planes [default: 0]
     #[arg(long, value_name = "MM", value_parser = words::number)]
     grip_mm: Option<f64>,
-    /// uniaxial, confined (sides held), or stiffness (all six unit strains) [default: uniaxial]
+    /// uniaxial, confined (sides held), or stiffness (voxel-fe: all six unit strains, to DIR/stiffness.json) [default: uniaxial]
     #[arg(long, value_parser = words::choice::<Load>(&["uniaxial", "confined", "stiffness"]))]
     load: Option<Load>,
     /// Whether the gripped ends may slide sideways: free, or bonded [default: free]
     #[arg(long, value_parser = words::choice::<Ends>(&["free", "bonded"]))]
     ends: Option<Ends>,
+    /// --load stiffness: what the unit strains do on the faces: kinematic (an upper bound), or mixed
+    /// (periodicity-compatible, Pahr & Zysset 2008) [default: kinematic]
+    #[arg(long, value_parser = words::choice::<Conditions>(&["kinematic", "mixed"]))]
+    conditions: Option<Conditions>,
     /// Load axis [default: z]
     #[arg(long, value_parser = words::choice::<Axis>(&["x", "y", "z"]))]
     axis: Option<Axis>,
@@ -78,6 +82,7 @@ impl SolveSettings {
         params.grip_mm = self.grip_mm.unwrap_or(params.grip_mm);
         params.load = self.load.unwrap_or(params.load);
         params.ends = self.ends.unwrap_or(params.ends);
+        params.conditions = self.conditions.unwrap_or(params.conditions);
         params.axis = self.axis.unwrap_or(params.axis);
         params.tolerance = self.tolerance.unwrap_or(params.tolerance);
         params.refine = self.refine.map_or(params.refine, usize::from);

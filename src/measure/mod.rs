@@ -5,4 +5,5 @@ pub mod ffb;
 pub mod morphometry;
 pub mod row;
 pub mod statistics;
+pub mod stiffness;
 pub mod thickness;

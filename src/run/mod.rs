@@ -16,6 +16,7 @@ pub mod scene;
 pub mod segment;
 pub mod session;
 pub mod solve;
+pub mod stiffness;
 
 /// How a command ended when nothing stopped it. Everything else is an [`crate::error::Error`] (exit 2).
 #[derive(Debug, Clone, PartialEq, Eq)]

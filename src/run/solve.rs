@@ -8,9 +8,10 @@ use crate::run::meter::Meter;
 use crate::run::results::Results;
 use crate::run::segment::load;
 use crate::run::session::Session;
+use crate::run::stiffness;
 use crate::solve::cg::CgStep;
 use crate::stage::lattice::{Case, LatticeParams};
-use crate::stage::solve::{Method, SolveParams, lattice, voxel_fe};
+use crate::stage::solve::{Load, Method, SolveParams, lattice, voxel_fe};
 use crate::volume::Specimen;
 use indicatif::ProgressBar;
 use std::path::Path;
@@ -37,18 +38,20 @@ pub fn solve(
     let mut rows = Vec::new();
     for job in jobs(lattices, params) {
         let blank = job.label(&specimen, params, params.row(&specimen));
-        let row = match results.find(&blank, params) {
-            Some(row) => row,
-            None if session.dry_run => {
-                session.say(format!(
-                    "would solve {} {} mm",
-                    job.name(&blank),
-                    blank.lp_mm
-                ));
-                continue;
-            }
-            None => solve_job(&specimen, &job, &blank, params, session)?,
-        };
+        let kept = results.find(&blank, params);
+        let row =
+            match kept.filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params)) {
+                Some(row) => row,
+                None if session.dry_run => {
+                    session.say(format!(
+                        "would solve {} {} mm",
+                        job.name(&blank),
+                        blank.lp_mm
+                    ));
+                    continue;
+                }
+                None => solve_job(dir, &specimen, &job, &blank, params, session)?,
+            };
         session.say(in_words(&row));
         results.keep(&blank, params, &row)?;
         rows.push(row);
@@ -92,6 +95,10 @@ impl Job {
         }
     }
 
+    fn is_stiffness(&self, params: &SolveParams) -> bool {
+        matches!(self, Job::VoxelFe) && params.load == Load::Stiffness
+    }
+
     fn name(&self, row: &Row) -> String {
         match self {
             Job::Lattice(case) => format!("{} {}", row.structure, case.boundary.name()),
@@ -101,6 +108,7 @@ impl Job {
 }
 
 fn solve_job(
+    dir: &Path,
     specimen: &Specimen,
     job: &Job,
     blank: &Row,
@@ -109,6 +117,16 @@ fn solve_job(
 ) -> Result<Row> {
     let meter = Meter::start();
     let bar = session.bar(1000, &format!("{} {} mm", job.name(blank), blank.lp_mm));
+    if job.is_stiffness(params) {
+        let observe = |load: usize, step| show_load(&bar, load, step, params.tolerance);
+        let row = stiffness::solve(dir, specimen, params, blank, session, observe)?;
+        bar.finish_and_clear();
+        return Ok(Row {
+            wall_s: Some(meter.wall_s()),
+            peak_mib: meter.peak_mib(),
+            ..row
+        });
+    }
     let observe = |step| show(&bar, step, params.tolerance);
     let solved = match job {
         Job::Lattice(case) => lattice::solve_lattice(specimen, case, params, observe)?,
@@ -128,6 +146,15 @@ fn show(bar: &ProgressBar, step: CgStep, tolerance: f64) {
         let gained = (error.log10() / tolerance.log10()).clamp(0.0, 1.0);
         bar.set_position((1000.0 * gained) as u64);
         bar.set_message(format!("iteration {}, error {:.1e}", step.iteration, error));
+    }
+}
+
+/// The same over six loads.
+fn show_load(bar: &ProgressBar, load: usize, step: CgStep, tolerance: f64) {
+    if let Some(error) = step.energy_error.filter(|e| *e > 0.0) {
+        let gained = (error.log10() / tolerance.log10()).clamp(0.0, 1.0);
+        bar.set_position((1000.0 * (load as f64 + gained) / 6.0) as u64);
+        bar.set_message(format!("strain {} of 6, error {error:.1e}", load + 1));
     }
 }
 

@@ -97,8 +97,30 @@ impl VoxelMesh {
             |run, y, z| spans(run, y, z)[0] <= grips.low,
             |run, y, z| spans(run, y, z)[1] >= grips.high,
         );
-        let rows = Rows::number(&kept)?;
-        let (segments, around) = rows.fill(&kept);
+        VoxelMesh::of(grid, &all, &kept)
+    }
+
+    /// Meshes the voxels for which `is_bone` holds and that are joined to a face of the grid.
+    ///
+    /// # Errors
+    /// If there are more nodes than 32-bit numbers. A specimen that reaches no face is an empty mesh.
+    pub fn at_faces<T: Sync>(
+        grid: Grid,
+        voxels: &[T],
+        is_bone: impl Fn(&T) -> bool + Sync,
+    ) -> Result<Self> {
+        let all = Runs::of(grid.n, voxels, is_bone);
+        let [nx, ny, nz] = grid.n;
+        let outer = |run: super::loaded::Run, y: usize, z: usize| {
+            run.x0 == 0 || run.x1 as usize == nx || y == 0 || y + 1 == ny || z == 0 || z + 1 == nz
+        };
+        let kept = all.spanning(outer, outer);
+        VoxelMesh::of(grid, &all, &kept)
+    }
+
+    fn of(grid: Grid, all: &Runs, kept: &Runs) -> Result<Self> {
+        let rows = Rows::number(kept)?;
+        let (segments, around) = rows.fill(kept);
         Ok(VoxelMesh {
             grid,
             segments,

@@ -32,7 +32,7 @@ pub fn solve_lattice(
     if params.load == Load::Stiffness {
         return Err(Error::setting(
             "load",
-            "the apparent stiffness matrix is computed by the voxel-fe method only",
+            "unit strains need faces, and a lattice ends half a cell inside the volume's sides",
             "add --method voxel-fe, or use --load uniaxial",
         ));
     }

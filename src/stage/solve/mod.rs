@@ -1,7 +1,9 @@
 //! Owns the solve stage: material, load, supports and accuracy in, apparent moduli out.
 
+pub mod bricks;
 pub mod lattice;
 pub mod solved;
+pub mod stiffness;
 pub mod voxel_fe;
 
 use crate::error::{Error, Result};
@@ -55,6 +57,38 @@ impl Ends {
     }
 }
 
+/// What unit strains do on the faces of the volume.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum Conditions {
+    /// Every node on a face moves as the homogeneous strain says: an upper bound.
+    #[default]
+    Kinematic,
+    /// Periodicity-compatible mixed uniform conditions (Pahr & Zysset 2008): faces slide as those of an orthotropic
+    /// periodic cell do, close to what larger specimens show.
+    Mixed,
+}
+
+impl Conditions {
+    pub fn name(self) -> &'static str {
+        match self {
+            Conditions::Kinematic => "kinematic",
+            Conditions::Mixed => "mixed",
+        }
+    }
+
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Conditions::Kinematic => {
+                "kinematic uniform boundary conditions (u = strain x on all faces; an upper bound)"
+            }
+            Conditions::Mixed => {
+                "periodicity-compatible mixed uniform boundary conditions (Pahr & Zysset 2008)"
+            }
+        }
+    }
+}
+
 /// Settings of `solve`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -68,6 +102,8 @@ pub struct SolveParams {
     pub grip_mm: f64,
     pub load: Load,
     pub ends: Ends,
+    /// load = "stiffness": what the unit strains do on the faces.
+    pub conditions: Conditions,
     pub axis: Axis,
     /// Relative algebraic error allowed in the headline modulus (0.001 is 0.1 %).
     pub tolerance: f64,
@@ -88,6 +124,7 @@ impl Default for SolveParams {
             grip_mm: 0.0,
             load: Load::Uniaxial,
             ends: Ends::Free,
+            conditions: Conditions::Kinematic,
             axis: Axis::Z,
             tolerance: 1e-3,
             max_iterations: 200_000,

@@ -3,7 +3,7 @@
 use crate::grid::Grid;
 use crate::measure::row::Row;
 use crate::solve::cg::Ended;
-use crate::stage::solve::SolveParams;
+use crate::stage::solve::{Load, SolveParams};
 use crate::volume::Specimen;
 
 /// A number with the part of it that the solver left undone.
@@ -67,7 +67,10 @@ impl SolveParams {
             young_mpa: self.young_mpa,
             poisson: self.poisson,
             load: self.load.name().to_owned(),
-            ends: self.ends.name().to_owned(),
+            ends: match self.load {
+                Load::Stiffness => self.conditions.name().to_owned(),
+                Load::Uniaxial | Load::Confined => self.ends.name().to_owned(),
+            },
             axis: self.axis.name().to_owned(),
             strain: self.strain,
             grip_mm: self.grip_mm,

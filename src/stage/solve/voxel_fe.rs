@@ -1,29 +1,19 @@
 //! Owns the solve by voxel finite elements: one brick per voxel, supports, multigrid, apparent moduli.
 
 use crate::error::{Error, Result};
-use crate::grid::Grid;
-use crate::mask::resample;
 use crate::measure::apparent::Loaded;
 use crate::measure::row::Row;
-use crate::operator::coarsen::Coarsen;
+use crate::operator::Operator;
 use crate::operator::held::Held;
 use crate::par::sum_chunks;
-use crate::physics::hex8::Hex8;
-use crate::physics::hex8::element::Integration;
-use crate::physics::hex8::graded::Graded;
 use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
 use crate::solve::fallback::minimise_or_fall_back;
+use crate::stage::solve::bricks::{Bricks, Keep};
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::{Ends, Load, SolveParams};
 use crate::topology::voxels::{Planes, VoxelMesh};
 use crate::volume::Specimen;
-
-/// Above this Poisson's ratio the dilatation is averaged over each element: full integration locks as ν → ½.
-pub const LOCKING_POISSON: f64 = 0.4;
-
-/// Bone fraction of a coarsened voxel below which it is no element.
-const LEAST_FRACTION: f32 = 0.02;
 
 /// Solves a specimen with one brick per voxel, or finer or coarser ones.
 ///
@@ -38,66 +28,15 @@ pub fn solve_voxels(
     if params.load == Load::Stiffness {
         return Err(Error::setting(
             "load",
-            "the apparent stiffness matrix is not available in this version",
-            "use --load uniaxial or confined, once per axis",
+            "the apparent stiffness matrix is no single modulus",
+            "call solve_stiffness",
         ));
     }
-    let (young, nu) = (params.young_mpa, params.poisson);
-    let rule = if nu > LOCKING_POISSON {
-        Integration::MeanDilatation
-    } else {
-        Integration::Full
-    };
-    if params.coarsen > 1 {
-        let fractions = resample::coarsen(&specimen.bone, params.coarsen);
-        let bone = |f: &f32| *f >= LEAST_FRACTION;
-        let (mesh, grips) = mesh(fractions.grid, fractions.as_slice(), bone, params)?;
-        let values = fractions.as_slice();
-        let model = Graded::new(mesh, young, nu, rule, |e| values[e]);
-        return Ok(solve_model(
-            &model,
-            model.mesh(),
-            grips,
-            specimen,
-            params,
-            observe,
-        ));
-    }
-    let refined = (params.refine > 1).then(|| resample::refine(&specimen.bone, params.refine));
-    let bone = refined.as_ref().unwrap_or(&specimen.bone);
-    let (mesh, grips) = mesh(bone.grid, bone.as_slice(), |b| *b != 0, params)?;
-    drop(refined);
-    let model = Hex8::new(mesh, young, nu, rule);
-    Ok(solve_model(
-        &model,
-        &model.mesh,
-        grips,
-        specimen,
-        params,
-        observe,
-    ))
-}
-
-fn mesh<T: Sync>(
-    grid: Grid,
-    voxels: &[T],
-    is_bone: impl Fn(&T) -> bool + Sync,
-    params: &SolveParams,
-) -> Result<(VoxelMesh, Planes)> {
-    let grips = Planes::within(&grid, params.axis, params.grip_mm)?;
-    Ok((VoxelMesh::new(grid, voxels, is_bone, grips)?, grips))
-}
-
-fn solve_model(
-    model: &impl Coarsen,
-    mesh: &VoxelMesh,
-    grips: Planes,
-    specimen: &Specimen,
-    params: &SolveParams,
-    observe: impl FnMut(CgStep),
-) -> Solved {
+    let model = Bricks::new(specimen, params, Keep::BetweenGrips)?;
+    let mesh = model.mesh();
+    let grips = Planes::within(&mesh.grid, params.axis, params.grip_mm)?;
     if mesh.is_empty() {
-        return Solved::disconnected(mesh.dropped);
+        return Ok(Solved::disconnected(mesh.dropped));
     }
     let axis = params.axis.index();
     let gauge_mm = (grips.high - grips.low) as f64 * mesh.grid.spacing_mm[axis];
@@ -112,18 +51,18 @@ fn solve_model(
         max_iterations: params.max_iterations,
         ..CgParams::default()
     };
-    let preconditioner = Amg::new(model, &held, &AmgParams::new(mesh.grid.spacing_mm));
-    let info = minimise_or_fall_back(model, &held, &preconditioner, &mut u, &cg, observe);
+    let preconditioner = Amg::new(&model, &held, &AmgParams::new(mesh.grid.spacing_mm));
+    let info = minimise_or_fall_back(&model, &held, &preconditioner, &mut u, &cg, observe);
     drop(preconditioner);
-    Solved {
+    Ok(Solved {
         sites: mesh.elements,
         dropped: mesh.dropped,
         unknowns: held.free::<3>(),
         iterations: info.iterations,
         residual: info.residual,
         ended: info.ended,
-        moduli: assess(model, mesh, grips, &loaded, &u, &info),
-    }
+        moduli: assess(&model, mesh, grips, &loaded, &u, &info),
+    })
 }
 
 /// Which unknowns are held, and a start that meets them: the field of a homogeneous bar.
@@ -167,7 +106,7 @@ fn along(grips: Planes, plane: usize) -> f64 {
 }
 
 fn assess(
-    model: &impl Coarsen,
+    model: &Bricks,
     mesh: &VoxelMesh,
     grips: Planes,
     loaded: &Loaded,

@@ -1,0 +1,123 @@
+//! Owns the voxel elements of a specimen: their size, equal or graded, and how they are integrated.
+
+use crate::error::Result;
+use crate::grid::Grid;
+use crate::mask::resample;
+use crate::operator::Operator;
+use crate::operator::coarsen::{Block, Coarsen};
+use crate::physics::hex8::Hex8;
+use crate::physics::hex8::element::Integration;
+use crate::physics::hex8::graded::Graded;
+use crate::stage::solve::SolveParams;
+use crate::topology::voxels::{Planes, VoxelMesh};
+use crate::volume::Specimen;
+use std::ops::Range;
+
+/// Above this Poisson's ratio the dilatation is averaged over each element: full integration locks as ν → ½.
+pub const LOCKING_POISSON: f64 = 0.4;
+
+/// Bone fraction of a coarsened voxel below which it is no element.
+const LEAST_FRACTION: f32 = 0.02;
+
+/// Which elements carry load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keep {
+    /// Those joined to both grips.
+    BetweenGrips,
+    /// Those joined to a face of the volume.
+    AtFaces,
+}
+
+/// One brick per voxel, or finer or coarser ones.
+pub enum Bricks {
+    Equal(Hex8),
+    Graded(Graded),
+}
+
+impl Bricks {
+    /// # Errors
+    /// Grips that meet, or too many nodes.
+    pub fn new(specimen: &Specimen, params: &SolveParams, keep: Keep) -> Result<Self> {
+        let (young, nu) = (params.young_mpa, params.poisson);
+        let rule = if nu > LOCKING_POISSON {
+            Integration::MeanDilatation
+        } else {
+            Integration::Full
+        };
+        if params.coarsen > 1 {
+            let fractions = resample::coarsen(&specimen.bone, params.coarsen);
+            let values = fractions.as_slice();
+            let bone = |f: &f32| *f >= LEAST_FRACTION;
+            let mesh = mesh(fractions.grid, values, bone, params, keep)?;
+            let graded = Graded::new(mesh, young, nu, rule, |e| values[e]);
+            return Ok(Bricks::Graded(graded));
+        }
+        let refined = (params.refine > 1).then(|| resample::refine(&specimen.bone, params.refine));
+        let bone = refined.as_ref().unwrap_or(&specimen.bone);
+        let mesh = mesh(bone.grid, bone.as_slice(), |b| *b != 0, params, keep)?;
+        Ok(Bricks::Equal(Hex8::new(mesh, young, nu, rule)))
+    }
+
+    pub fn mesh(&self) -> &VoxelMesh {
+        match self {
+            Bricks::Equal(model) => &model.mesh,
+            Bricks::Graded(model) => model.mesh(),
+        }
+    }
+}
+
+fn mesh<T: Sync>(
+    grid: Grid,
+    voxels: &[T],
+    is_bone: impl Fn(&T) -> bool + Sync,
+    params: &SolveParams,
+    keep: Keep,
+) -> Result<VoxelMesh> {
+    match keep {
+        Keep::BetweenGrips => {
+            let grips = Planes::within(&grid, params.axis, params.grip_mm)?;
+            VoxelMesh::new(grid, voxels, is_bone, grips)
+        }
+        Keep::AtFaces => VoxelMesh::at_faces(grid, voxels, is_bone),
+    }
+}
+
+impl Operator<3> for Bricks {
+    fn sites(&self) -> usize {
+        self.mesh().len()
+    }
+
+    fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.apply(x, y),
+            Bricks::Graded(model) => model.apply(x, y),
+        }
+    }
+
+    fn diagonal(&self, d: &mut [[f64; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.diagonal(d),
+            Bricks::Graded(model) => model.diagonal(d),
+        }
+    }
+}
+
+impl Coarsen for Bricks {
+    fn position(&self, site: usize) -> [f64; 3] {
+        self.mesh().position(site)
+    }
+
+    fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>) {
+        match self {
+            Bricks::Equal(model) => model.row(site, blocks),
+            Bricks::Graded(model) => model.row(site, blocks),
+        }
+    }
+
+    fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.rows_f32(sites, x, y),
+            Bricks::Graded(model) => model.rows_f32(sites, x, y),
+        }
+    }
+}

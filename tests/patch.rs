@@ -45,17 +45,9 @@ fn affine(sites: &Sites, strain: [[f64; 3]; 3]) -> Vec<[f64; 3]> {
 
 /// A site whose neighbours are all fully coordinated.
 fn innermost(sites: &Sites) -> usize {
-    let z = sites.frame.structure.stencil().coordination();
     let deep = |&s: &usize| {
-        let all = |t: usize| {
-            sites.neighbours[t * z..(t + 1) * z]
-                .iter()
-                .all(|&n| n as usize != t)
-        };
-        all(s)
-            && sites.neighbours[s * z..(s + 1) * z]
-                .iter()
-                .all(|&n| all(n as usize))
+        let all = |t: usize| sites.neighbours_of(t).iter().all(|&n| n as usize != t);
+        all(s) && sites.neighbours_of(s).iter().all(|&n| all(n as usize))
     };
     (0..sites.len())
         .filter(deep)

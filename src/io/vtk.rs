@@ -33,12 +33,8 @@ fn lattice(out: &mut impl Write, sites: &Sites) -> std::io::Result<()> {
     let bonds = sites.bonds();
     writeln!(out, "\nLINES {bonds} {}", 3 * bonds)?;
     for s in 0..sites.len() {
-        for &end in sites
-            .neighbours_of(s)
-            .iter()
-            .step_by(2)
-            .filter(|&&end| end as usize != s)
-        {
+        let row = sites.neighbours_of(s);
+        for &end in row.iter().step_by(2).filter(|&&end| end as usize != s) {
             for v in [2, s as i32, end as i32] {
                 out.write_all(&v.to_be_bytes())?;
             }

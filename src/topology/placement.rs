@@ -1,5 +1,7 @@
 //! Owns where lattice sites sit in a specimen and which of them exist: the floppy, firm and graded rules.
 
+mod near_bone;
+
 use crate::error::{Error, Result};
 use crate::grid::{Axis, Grid};
 use crate::topology::stencil::Structure;
@@ -144,22 +146,17 @@ impl Frame {
 
 /// Weight of every candidate: 0 where no site exists, 1 for firm and floppy sites, the bone fraction for graded ones.
 pub fn weigh(frame: &Frame, bone: &Volume<u8>, boundary: Boundary) -> Vec<f32> {
+    if boundary == Boundary::Firm {
+        return near_bone::weigh(frame, bone);
+    }
     let weight = |indices: [i32; 3]| match boundary {
         _ if !frame.structure.allows(indices) => 0.0,
-        Boundary::Floppy => f32::from(in_bone(bone, frame.position_mm(indices))),
-        Boundary::Firm => {
-            let radius = 1.1 * frame.structure.first_neighbour() * frame.lp_mm;
-            f32::from(u8::from(near_bone(
-                bone,
-                frame.position_mm(indices),
-                radius,
-            )))
-        }
         Boundary::Graded => {
             let edge = frame.lp_mm * frame.structure.cell_volume().cbrt();
             let w = bone_fraction(bone, frame.position_mm(indices), edge);
             if w > LEAST_FRACTION { w as f32 } else { 0.0 }
         }
+        _ => f32::from(in_bone(bone, frame.position_mm(indices))),
     };
     (0..frame.candidates())
         .into_par_iter()
@@ -170,48 +167,6 @@ pub fn weigh(frame: &Frame, bone: &Volume<u8>, boundary: Boundary) -> Vec<f32> {
 /// 1 if the voxel that contains the position (or the nearest on the volume's faces) is bone.
 fn in_bone(bone: &Volume<u8>, position_mm: [f64; 3]) -> u8 {
     u8::from(bone.as_slice()[bone.grid.index(bone.grid.voxel_at(position_mm))] != 0)
-}
-
-/// Whether a bone voxel's centre lies within `radius` of a position.
-fn near_bone(bone: &Volume<u8>, position_mm: [f64; 3], radius: f64) -> bool {
-    let (grid, values) = (&bone.grid, bone.as_slice());
-    let squared = radius * radius * (1.0 + 1e-12);
-    let [h0, h1, h2] = grid.spacing_mm;
-    let (k0, k1) = centres_within(position_mm[2], radius, h2, grid.n[2]);
-    for k in k0..k1 {
-        let dz = (k as f64 + 0.5) * h2 - position_mm[2];
-        let left = squared - dz * dz;
-        if left < 0.0 {
-            continue;
-        }
-        let (j0, j1) = centres_within(position_mm[1], left.sqrt(), h1, grid.n[1]);
-        for j in j0..j1 {
-            let dy = (j as f64 + 0.5) * h1 - position_mm[1];
-            let left = left - dy * dy;
-            if left < 0.0 {
-                continue;
-            }
-            let (i0, i1) = centres_within(position_mm[0], left.sqrt(), h0, grid.n[0]);
-            if i0 < i1 {
-                let row = grid.index([0, j, k]);
-                if values[row + i0..row + i1].iter().any(|&b| b != 0) {
-                    return true;
-                }
-            }
-        }
-    }
-    false
-}
-
-/// Voxels `first..past` along one axis whose centres lie within `radius` of `x`.
-fn centres_within(x: f64, radius: f64, h: f64, n: usize) -> (usize, usize) {
-    let low = ((x - radius) / h - 0.5).ceil().max(0.0);
-    let high = ((x + radius) / h - 0.5).floor();
-    if high < 0.0 {
-        (0, 0)
-    } else {
-        (low as usize, (high as usize + 1).min(n))
-    }
 }
 
 /// Share of bone in the cube of edge `edge` around a position, of the part of the cube inside the volume.

@@ -1,5 +1,6 @@
 //! Owns the lattice of one specimen: its sites, their neighbours, its grips, and what was dropped.
 
+use crate::topology::neighbours::{Neighbours, Row};
 use crate::topology::placement::Frame;
 use crate::topology::stencil::Stencil;
 use rayon::prelude::*;
@@ -10,8 +11,8 @@ pub struct Sites {
     pub frame: Frame,
     /// Grid indices of each site.
     pub indices: Vec<[i32; 3]>,
-    /// `coordination` entries per site; a missing neighbour is the site itself (its bond then stretches by nothing).
-    pub neighbours: Vec<u32>,
+    /// A missing neighbour is the site itself (its bond then stretches by nothing).
+    pub neighbours: Neighbours,
     /// Share of a whole site's stiffness, only where sites differ (graded).
     pub weights: Option<Vec<f64>>,
     /// Planes (indices along the load axis) up to which, and from which, sites are gripped.
@@ -62,17 +63,12 @@ impl Sites {
         }
         let indices: Vec<[i32; 3]> = kept.iter().map(|&c| frame.indices(c)).collect();
         let z = stencil.coordination();
-        let mut neighbours = vec![0; kept.len() * z];
-        neighbours
-            .par_chunks_mut(z)
-            .zip(&indices)
-            .enumerate()
-            .for_each(|(s, (row, &at))| {
-                for (b, slot) in row.iter_mut().enumerate() {
-                    let found = step(&frame, at, stencil.direction(b)).map(|c| number[c]);
-                    *slot = found.filter(|&n| n != u32::MAX).unwrap_or(s as u32);
-                }
-            });
+        let neighbours = Neighbours::new(kept.len(), z, |s, b| {
+            step(&frame, indices[s], stencil.direction(b))
+                .map(|c| number[c])
+                .filter(|&n| n != u32::MAX)
+        });
+        drop(number);
         let graded = weights.iter().any(|&w| w > 0.0 && w < 1.0);
         let weights = graded.then(|| kept.iter().map(|&c| f64::from(weights[c])).collect());
         Sites {
@@ -94,9 +90,8 @@ impl Sites {
     }
 
     /// Neighbours of a site, one per bond of the stencil; a missing one is the site itself.
-    pub fn neighbours_of(&self, site: usize) -> &[u32] {
-        let z = self.neighbours.len() / self.len();
-        &self.neighbours[site * z..(site + 1) * z]
+    pub fn neighbours_of(&self, site: usize) -> Row {
+        self.neighbours.row(site)
     }
 
     /// Index of a site's plane along the load axis.
@@ -113,24 +108,23 @@ impl Sites {
 
     /// Bonds, each counted once.
     pub fn bonds(&self) -> usize {
-        let z = self.frame.structure.stencil().coordination();
-        let ends: usize = self
-            .neighbours
-            .par_chunks(z)
-            .enumerate()
-            .map(|(s, row)| row.iter().filter(|&&n| n as usize != s).count())
-            .sum();
+        let bonded = |s: usize| {
+            let row = self.neighbours_of(s);
+            row.iter().filter(|&&n| n as usize != s).count()
+        };
+        let ends: usize = (0..self.len()).into_par_iter().map(bonded).sum();
         ends / 2
     }
 
     /// Whether a site has all its bonds; on the loaded faces, all the bonds that stay inside the volume.
     pub fn fully_coordinated(&self, site: usize) -> bool {
         let stencil = self.frame.structure.stencil();
-        let (z, a) = (stencil.coordination(), self.frame.axis.index());
+        let a = self.frame.axis.index();
         let last = self.frame.planes() as i32 - 1;
-        (0..z).all(|b| {
+        let row = self.neighbours_of(site);
+        row.iter().enumerate().all(|(b, &n)| {
             let plane = self.plane(site) + stencil.direction(b)[a];
-            plane < 0 || plane > last || self.neighbours[site * z + b] as usize != site
+            plane < 0 || plane > last || n as usize != site
         })
     }
 
@@ -153,8 +147,10 @@ fn step(frame: &Frame, at: [i32; 3], direction: [i32; 3]) -> Option<usize> {
 /// Candidates with a path of bonds to both grips.
 fn load_carrying(frame: &Frame, weights: &[f32], stencil: &Stencil, grips: Grips) -> Vec<bool> {
     let a = frame.axis.index();
-    let low = reached(frame, weights, stencil, |at| at[a] <= grips.low);
-    let high = reached(frame, weights, stencil, |at| at[a] >= grips.high);
+    let (low, high) = rayon::join(
+        || reached(frame, weights, stencil, |at| at[a] <= grips.low),
+        || reached(frame, weights, stencil, |at| at[a] >= grips.high),
+    );
     low.into_iter().zip(high).map(|(l, h)| l && h).collect()
 }
 

@@ -7,6 +7,8 @@ usage: tests/peers/rivals.py [CASE ...]        (default: small; see CASES below 
     thin[=SEED]      thin, hard phantom of about 1 M unknowns (BV/TV 12 %, struts of two voxels): ParOSol
     stack            the shared stack coarsened twofold, ends bonded: ParOSol
     lattice=LP       the shared stack (else a phantom) as SC floppy and firm lattices at nu = 1/4: LAMMPS
+    protocol         bonepd-ct alone: the paper's eight lattices, the shared stack (else a phantom) from file to report
+    full             bonepd-ct alone: the shared stack by voxel FE at full resolution
 
 ParOSol is `parosol-py` (PyPI: pip install parosol-py, in the Python that runs this), CalculiX is `ccx` (Debian:
 calculix-ccx), LAMMPS is `lmp` (Debian: lammps). What is missing is skipped with its reason.
@@ -293,7 +295,43 @@ def lattice(folder, lp):
             print("  LAMMPS    failed: see its log")
 
 
-CASES = {"small": small, "thin": thin, "stack": stack, "lattice": lattice}
+# --- alone --------------------------------------------------------------------------------------------------------
+
+def protocol(folder, _):
+    recipe = (ROOT / "pipelines/paper.toml").read_text()
+    scan, flags = STACK, STACK_FLAGS[:2]
+    if STACK.exists():
+        for old, new in (("lower = 200.0", "lower = 63.0"), ("upper = 5600.0", ""), ("voxels = 0.0", "voxels = 1.0")):
+            recipe = recipe.replace(old, new)
+    else:
+        scan, flags = folder / "scan.nii.gz", []
+        ours("phantom", "-o", scan, "--size-mm", "4", "--spacing-mm", "0.02", "--bvtv", "0.25")
+    (folder / "recipe.toml").write_text(recipe)
+    walls = []
+    for i in range(5):
+        walls.append(timed("run", folder / "recipe.toml", scan, "-o", folder / f"out{i}", *flags))
+    found = rows(folder / "out0")
+    print(f"\nprotocol on {scan.name}: {len(found)} lattices, {sum(int(r['sites']) for r in found):,} sites, file to report "
+          f"{sorted(walls)[2]:.2f} s (median of {', '.join(f'{w:.2f}' for w in sorted(walls))}); the solves "
+          f"{sum(float(r['wall_s']) for r in found):.2f} s")
+    for r in found:
+        print(f"  {r['boundary']:7} LP {r['lp_mm']:5} {int(r['sites']):>8,} sites {r['iterations']:>4} iterations "
+              f"{float(r['wall_s']):.3f} s  E_app {float(r['e_app_mpa']):.2f} MPa")
+
+
+def full(folder, _):
+    if not STACK.exists():
+        print(f"full: skipped: {STACK} is not there")
+        return
+    ours("segment", STACK, "-o", folder, *STACK_FLAGS)
+    walls = [timed("solve", folder, "--method", "voxel-fe", "--force") for _ in range(REPEATS)]
+    row = rows(folder)[0]
+    print(f"\nfull: {int(row['sites']):,} hexahedra, {int(row['unknowns']):,} unknowns, {row['iterations']} iterations, "
+          f"{sorted(walls)[REPEATS // 2]:.2f} s, E_app {float(row['e_app_mpa']):.3f} ± "
+          f"{float(row['algebraic_error_mpa']):.3f} MPa")
+
+
+CASES = {"small": small, "thin": thin, "stack": stack, "lattice": lattice, "protocol": protocol, "full": full}
 
 
 def main():

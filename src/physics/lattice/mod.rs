@@ -83,20 +83,17 @@ impl<'a> Lattice<'a> {
         self.sites.weights.as_ref().map_or(1.0, |w| w[site])
     }
 
-    /// Both neighbours along pair `p`; a missing one is the site itself.
-    fn ends(&self, site: usize, p: usize) -> (usize, usize) {
-        let row = site * 2 * self.pairs.len() + 2 * p;
-        (
-            self.sites.neighbours[row] as usize,
-            self.sites.neighbours[row + 1] as usize,
-        )
+    /// Every pair with both neighbours along it; a missing one is the site itself.
+    fn bonded(&self, site: usize) -> impl Iterator<Item = (&Pair, usize, usize)> {
+        let row = self.sites.neighbours_of(site);
+        let pairs = self.pairs.iter().enumerate();
+        pairs.map(move |(p, pair)| (pair, row[2 * p] as usize, row[2 * p + 1] as usize))
     }
 
     /// Volumetric sums `θ_s = Σ_{j∈s} dl_ij` of one site.
     fn volumetric_sums(&self, u: &[[f64; 3]], site: usize) -> [f64; 2] {
         let mut theta = [0.0; 2];
-        for (p, pair) in self.pairs.iter().enumerate() {
-            let (plus, minus) = self.ends(site, p);
+        for (pair, plus, minus) in self.bonded(site) {
             theta[pair.shell] += pair.half * along(pair.d, u[plus], u[minus]);
         }
         theta
@@ -112,8 +109,7 @@ impl<'a> Lattice<'a> {
     /// Energy of one site in N mm, by the formula of the module's head.
     pub fn site_energy(&self, u: &[[f64; 3]], site: usize) -> f64 {
         let mut springs = 0.0;
-        for (p, pair) in self.pairs.iter().enumerate() {
-            let (plus, minus) = self.ends(site, p);
+        for (pair, plus, minus) in self.bonded(site) {
             for end in [plus, minus] {
                 let dl = pair.half * along(pair.d, u[end], u[site]);
                 springs += self.moduli.k[pair.shell] * dl * dl;
@@ -134,11 +130,10 @@ impl<'a> Lattice<'a> {
         };
         let plane = self.sites.plane(site);
         let mut sum = 0.0;
-        for (p, pair) in self.pairs.iter().enumerate() {
+        for (pair, plus, minus) in self.bonded(site) {
             if pair.d[axis] == 0.0 {
                 continue;
             }
-            let (plus, minus) = self.ends(site, p);
             for (end, sign) in [(plus, 1.0), (minus, -1.0)] {
                 if end == site {
                     continue;
@@ -201,14 +196,24 @@ impl Lattice<'_> {
         }
     }
 
-    fn volumetric_pass(&self, sites: Range<usize>, u: &[[f64; 3]], theta: &mut [[f64; 2]]) {
+    /// The springs' part of `K u` and the volumetric sums at `sites`.
+    fn springs_and_sums(
+        &self,
+        sites: Range<usize>,
+        u: &[[f64; 3]],
+        y: &mut [[f64; 3]],
+        theta: &mut [[f64; 2]],
+    ) {
         assert_eq!(u.len(), self.sites.len());
+        let weights = self.sites.weights.as_deref();
         // SAFETY: as `springs`.
         unsafe {
             match isa() {
                 #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => avx2::volumetric_sums(self.bonds(), sites, u, theta),
-                _ => kernel::volumetric_sums::<quad::Plain64>(self.bonds(), sites, u, theta),
+                Isa::Avx2 | Isa::Avx512 => {
+                    avx2::springs_and_sums(self.bonds(), weights, sites, u, y, theta);
+                }
+                _ => springs_and_sums::<quad::Plain64>(self.bonds(), weights, sites, u, y, theta),
             }
         }
     }
@@ -246,6 +251,30 @@ unsafe fn springs<Q: quad::Quad>(
     }
 }
 
+/// The same with volumetric sums.
+///
+/// # Safety
+/// As [`kernel::springs`].
+#[inline(always)]
+unsafe fn springs_and_sums<Q: quad::Quad>(
+    bonds: Bonds<Q::S>,
+    weights: Option<&[Q::S]>,
+    sites: Range<usize>,
+    u: &[[Q::S; 3]],
+    y: &mut [[Q::S; 3]],
+    theta: &mut [[Q::S; 2]],
+) {
+    unsafe {
+        match weights {
+            None => kernel::springs_and_sums::<Q>(bonds, sites, u, y, theta),
+            Some(w) => {
+                kernel::graded_springs::<Q>(bonds, w, sites.clone(), u, y);
+                kernel::volumetric_sums::<Q>(bonds, sites, u, theta);
+            }
+        }
+    }
+}
+
 /// The kernels compiled for AVX2 with fused multiply-add.
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
@@ -276,13 +305,15 @@ mod avx2 {
     }
 
     #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn volumetric_sums(
+    pub unsafe fn springs_and_sums(
         bonds: Bonds<f64>,
+        weights: Option<&[f64]>,
         sites: Range<usize>,
         u: &[[f64; 3]],
+        y: &mut [[f64; 3]],
         theta: &mut [[f64; 2]],
     ) {
-        unsafe { kernel::volumetric_sums::<Avx64>(bonds, sites, u, theta) }
+        unsafe { super::springs_and_sums::<Avx64>(bonds, weights, sites, u, y, theta) }
     }
 
     #[target_feature(enable = "avx2,fma")]
@@ -317,21 +348,19 @@ impl Operator<3> for Lattice<'_> {
             .volumetric
             .lock()
             .expect("no application panics while it holds the scratch");
-        scratch
+        let chunks = scratch
             .par_chunks_mut(PORTION)
-            .enumerate()
-            .for_each(|(c, theta)| {
-                let sites = range(c, theta.len());
-                self.volumetric_pass(sites.clone(), x, theta);
-                for (site, theta) in sites.zip(theta) {
-                    *theta = theta.map(|sum| self.weight(site) * t * sum);
-                }
-            });
+            .zip(y.par_chunks_mut(PORTION));
+        chunks.enumerate().for_each(|(c, (theta, y))| {
+            let sites = range(c, theta.len());
+            self.springs_and_sums(sites.clone(), x, y, theta);
+            for (site, theta) in sites.zip(theta) {
+                *theta = theta.map(|sum| self.weight(site) * t * sum);
+            }
+        });
         let scratch = &*scratch;
         y.par_chunks_mut(PORTION).enumerate().for_each(|(c, y)| {
-            let sites = range(c, y.len());
-            self.springs(sites.clone(), x, y);
-            self.add_volumetric_forces(sites, scratch, y);
+            self.add_volumetric_forces(range(c, y.len()), scratch, y);
         });
     }
 
@@ -346,8 +375,7 @@ impl Lattice<'_> {
     fn site_diagonal(&self, site: usize) -> [f64; 3] {
         let (t, w) = (self.moduli.t, self.weight(site));
         let (mut d, mut gradient) = ([0.0; 3], [[0.0; 3]; 2]);
-        for (p, pair) in self.pairs.iter().enumerate() {
-            let (plus, minus) = self.ends(site, p);
+        for (pair, plus, minus) in self.bonded(site) {
             for (end, sign) in [(plus, 1.0), (minus, -1.0)] {
                 if end == site {
                     continue;

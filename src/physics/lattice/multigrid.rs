@@ -65,8 +65,7 @@ impl Operator<3> for Springs<'_> {
 impl Springs<'_> {
     /// Calls `visit` with every bonded neighbour and the bond's stiffness `½ k n nᵀ`.
     fn each_bond(&self, site: usize, mut visit: impl FnMut(usize, [[f64; 3]; 3])) {
-        for (p, pair) in self.lattice.pairs.iter().enumerate() {
-            let (plus, minus) = self.lattice.ends(site, p);
+        for (pair, plus, minus) in self.lattice.bonded(site) {
             for end in [plus, minus] {
                 if end != site {
                     let c = self.share(site, end) * pair.spring;

@@ -1,0 +1,100 @@
+//! Heap of whole solves beyond the scan, at its highest: bytes per lattice site and per voxel element.
+//! `cargo bench --bench memory`; `BONEPD_BENCH_VOXELS` sets the edge (default 160: about 1e6 sites and elements).
+
+mod specimen;
+
+use bonepd_ct::stage::lattice::{Boundary, Case, Structure};
+use bonepd_ct::stage::solve::SolveParams;
+use bonepd_ct::stage::solve::lattice::solve_lattice;
+use bonepd_ct::stage::solve::solved::Solved;
+use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+static NOW: AtomicUsize = AtomicUsize::new(0);
+static HIGHEST: AtomicUsize = AtomicUsize::new(0);
+
+/// The system's allocator, counting.
+struct Counting;
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+impl Counting {
+    fn add(bytes: usize) {
+        HIGHEST.fetch_max(NOW.fetch_add(bytes, Relaxed) + bytes, Relaxed);
+    }
+}
+
+// SAFETY: everything is handed to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        Counting::add(layout.size());
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        Counting::add(layout.size());
+        unsafe { System.alloc_zeroed(layout) }
+    }
+    unsafe fn dealloc(&self, p: *mut u8, layout: Layout) {
+        NOW.fetch_sub(layout.size(), Relaxed);
+        unsafe { System.dealloc(p, layout) }
+    }
+    unsafe fn realloc(&self, p: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        Counting::add(size);
+        NOW.fetch_sub(layout.size(), Relaxed);
+        unsafe { System.realloc(p, layout, size) }
+    }
+}
+
+/// What `f` yields, and the most bytes alive at a time beyond those before.
+fn highest<T>(f: impl FnOnce() -> T) -> (T, usize) {
+    let before = NOW.load(Relaxed);
+    HIGHEST.store(before, Relaxed);
+    let made = f();
+    (made, HIGHEST.load(Relaxed) - before)
+}
+
+fn main() {
+    let n = specimen::edge(160);
+    for (name, wave, solid) in [("plump", 40.0, 0.25), ("thin", 20.0, 0.12)] {
+        let bone = specimen::waves(n, wave, solid);
+        let params = SolveParams::default();
+        let report = |model: &str, (solved, bytes): (Solved, usize)| {
+            println!(
+                "{name:<6} {model:<22} {:>9} sites or elements  {:>8.1} MiB  {:>6.1} bytes each  {:>3} iterations",
+                solved.sites,
+                bytes as f64 / f64::from(1 << 20),
+                bytes as f64 / solved.sites as f64,
+                solved.iterations
+            );
+        };
+        for (structure, boundary) in [
+            (Structure::Sc, Boundary::Floppy),
+            (Structure::Sc, Boundary::Firm),
+            (Structure::Bcc, Boundary::Floppy),
+        ] {
+            let lp_mm = match (structure, boundary) {
+                (Structure::Bcc, _) => 0.02 * 2f64.cbrt(),
+                (_, Boundary::Firm) => 0.03,
+                _ => 0.02,
+            };
+            let case = Case {
+                structure,
+                lp_mm,
+                boundary,
+                registration_mm: [0.0; 3],
+            };
+            let solve =
+                || solve_lattice(&bone, &case, &params, |_| ()).expect("a lattice that fits");
+            report(
+                &format!("lattice {} {}", structure.name(), boundary.name()),
+                highest(solve),
+            );
+        }
+        report(
+            "voxel-fe",
+            highest(|| solve_voxels(&bone, &params, |_| ()).expect("a mesh that fits")),
+        );
+    }
+}

@@ -177,7 +177,7 @@ impl Run<'_> {
 fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Result<Vec<Row>> {
     segment::segment(&job.input, dir, Some(&job.name), &job.segment, session)?;
     if lattice::settings(dir).ok().as_ref() != Some(&recipe.lattice) || session.force {
-        lattice::lattice(dir, &recipe.lattice, &[], session)?;
+        lattice::remember(dir, &recipe.lattice)?;
     }
     let mut rows = solve::solve(dir, &recipe.lattice, &recipe.solve, session)?;
     for row in &mut rows {

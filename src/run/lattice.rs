@@ -17,7 +17,8 @@ pub enum Export {
     Vtk,
 }
 
-/// `lattice.json`: the settings `solve` finds there, and what they came to.
+/// `lattice.json`: the settings `solve` finds there, and what they came to (nothing where `run` went straight on to the
+/// solves).
 #[derive(Debug, Serialize, Deserialize)]
 struct Record {
     version: String,
@@ -48,16 +49,26 @@ pub fn lattice(
         }
     }
     if !session.dry_run {
-        let version = env!("CARGO_PKG_VERSION").to_owned();
-        let record = Record {
-            version,
-            settings: params.clone(),
-            lattices: lattices.clone(),
-        };
-        let text = serde_json::to_string_pretty(&record).expect("plain data");
-        atomic::write(&dir.join(RECORD), text)?;
+        write(dir, params, lattices.clone())?;
     }
     Ok(lattices)
+}
+
+/// Writes `dir/lattice.json` for `solve` to find the settings there, without building a lattice: `solve` builds each
+/// once, and its rows tell what it came to.
+pub fn remember(dir: &Path, params: &LatticeParams) -> Result<()> {
+    params.check()?;
+    write(dir, params, Vec::new())
+}
+
+fn write(dir: &Path, params: &LatticeParams, lattices: Vec<LatticeSummary>) -> Result<()> {
+    let record = Record {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        settings: params.clone(),
+        lattices,
+    };
+    let text = serde_json::to_string_pretty(&record).expect("plain data");
+    atomic::write(&dir.join(RECORD), text)
 }
 
 fn export(dir: &Path, case: &Case, sites: &Sites, exports: &[Export]) -> Result<()> {

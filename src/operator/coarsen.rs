@@ -9,14 +9,27 @@ pub type Block = [[f32; 3]; 3];
 
 /// An operator on displacements that algebraic multigrid can coarsen. It is never assembled: rows are made when asked
 /// for. All of it is the free operator: supports are told to the solver separately, as held components.
+///
+/// Everything is asked for by ranges of sites, on the calling thread, so that whoever asks decides how much of it is
+/// alive at a time.
 pub trait Coarsen: Operator<3> {
-    /// Where a site is, in mm. Rigid motions are made from it.
-    fn position(&self, site: usize) -> [f64; 3];
+    /// Where sites are, in mm. Rigid motions are made from it.
+    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]);
 
-    /// Appends the non-zero blocks of one row, the diagonal block among them, each as (column's site, block).
-    /// A site without a row (padding) appends nothing and is left out of everything.
-    fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>);
+    /// Calls `visit` with every site of the range, in order, and the non-zero blocks of its row, the diagonal block
+    /// among them: the columns' sites, and as many blocks. A site with an empty row (padding) is left out of everything.
+    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block]));
 
-    /// `y[i − sites.start] = (A x)_i` for `i` in `sites`, in single precision, on the calling thread.
+    /// A range that holds every column of these rows. Need not be tight.
+    fn reach(&self, sites: Range<usize>) -> Range<usize>;
+
+    /// `y[i − sites.start] = (A x)_i` for `i` in `sites`.
+    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]);
+
+    /// The same in single precision.
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]);
+
+    /// A bound of the largest eigenvalue of `D⁻¹A`, `D` the 3 × 3 diagonal blocks, that holds whatever is held. From
+    /// parts: where `A = Σ A_e` and each part's eigenvalues are below the bound, so are those of the sum.
+    fn eigenvalue_bound(&self) -> f64;
 }

@@ -21,3 +21,9 @@ pub trait Operator<const D: usize>: Sync {
 pub trait Preconditioner<const D: usize>: Sync {
     fn apply(&self, r: &[[f64; D]], z: &mut [[f64; D]]);
 }
+
+/// The same in single precision, for solvers that keep their vectors so.
+pub trait SinglePreconditioner<const D: usize>: Sync {
+    /// `z ≈ A⁻¹ r`, zero in held components; `spare` is room for one vector more. Both change places at will.
+    fn apply_single(&self, r: &[[f32; D]], z: &mut Vec<[f32; D]>, spare: &mut Vec<[f32; D]>);
+}

@@ -164,17 +164,23 @@ impl VoxelMesh {
             })
     }
 
+    /// A range that holds every neighbour of these nodes.
+    pub fn reach(&self, nodes: Range<usize>) -> Range<usize> {
+        let (mut low, mut high) = (nodes.start, nodes.end);
+        for s in self.segments_in(nodes) {
+            for row in s.rows.map(|r| r as usize) {
+                low = low.min(row.saturating_sub(1));
+                high = high.max(row + s.len as usize + 1);
+            }
+        }
+        low..high.min(self.len())
+    }
+
     /// Node indices (0 to n along each axis) of a node.
     pub fn indices(&self, node: usize) -> [u32; 3] {
         let i = self.segments.partition_point(|s| s.nodes().end <= node);
         let s = self.segments[i];
         [s.at[0] + node as u32 - s.start, s.at[1], s.at[2]]
-    }
-
-    /// Position of a node in mm.
-    pub fn position(&self, node: usize) -> [f64; 3] {
-        let at = self.indices(node);
-        std::array::from_fn(|a| f64::from(at[a]) * self.grid.spacing_mm[a])
     }
 
     /// The element of which each node is the corner of smallest x, y, z, in the order of the nodes, as indices into

@@ -92,6 +92,45 @@ fn gradients(h: [f64; 3], point: usize) -> [[f64; 3]; 8] {
     })
 }
 
+/// The largest eigenvalue of `D⁻¹K`, `D` the 3 × 3 diagonal blocks of `K`, rounded up.
+pub fn eigenvalue_bound(k: &ElementMatrix) -> f64 {
+    // A start without symmetry, and steps enough for eigenvalues that lie close together.
+    let mut x: [f64; 24] = std::array::from_fn(|i| (1.3 * i as f64 + 0.2).sin());
+    let mut largest = 0.0;
+    for _ in 0..400 {
+        let y = k.map(|row| row.iter().zip(&x).map(|(a, b)| a * b).sum::<f64>());
+        let energy: f64 = x.iter().zip(&y).map(|(a, b)| a * b).sum();
+        let z = divided_by_blocks(k, &y);
+        let image: f64 = y.iter().zip(&z).map(|(a, b)| a * b).sum();
+        largest = image / energy;
+        let shrink = image.sqrt().recip();
+        x = z.map(|v| v * shrink);
+    }
+    1.001 * largest
+}
+
+/// `D⁻¹ y` by Cramer's rule, block by block.
+fn divided_by_blocks(k: &ElementMatrix, y: &[f64; 24]) -> [f64; 24] {
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [0, 1, 2].map(|i: usize| {
+            let (j, l) = ((i + 1) % 3, (i + 2) % 3);
+            a[j] * b[l] - a[l] * b[j]
+        })
+    };
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let mut z = [0.0; 24];
+    for corner in 0..8 {
+        let column = |c: usize| [0, 1, 2].map(|r| k[3 * corner + r][3 * corner + c]);
+        let (a, b, c) = (column(0), column(1), column(2));
+        let right = [0, 1, 2].map(|r| y[3 * corner + r]);
+        let determinant = dot(a, cross(b, c));
+        z[3 * corner] = dot(right, cross(b, c)) / determinant;
+        z[3 * corner + 1] = dot(a, cross(right, c)) / determinant;
+        z[3 * corner + 2] = dot(a, cross(b, right)) / determinant;
+    }
+    z
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

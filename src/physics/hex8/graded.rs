@@ -60,10 +60,8 @@ impl Operator<3> for Graded {
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        let Hex8 { mesh, double, .. } = &self.uniform;
         y.par_chunks_mut(par::CHUNK).enumerate().for_each(|(c, y)| {
-            let nodes = c * par::CHUNK..c * par::CHUNK + y.len();
-            kernel::graded_f64(mesh, double, &self.factor, nodes, x, y);
+            self.rows_f64(c * par::CHUNK..c * par::CHUNK + y.len(), x, y);
         });
     }
 
@@ -79,30 +77,45 @@ impl Operator<3> for Graded {
 }
 
 impl Coarsen for Graded {
-    fn position(&self, site: usize) -> [f64; 3] {
-        self.uniform.position(site)
+    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
+        self.uniform.positions(sites, x);
     }
 
-    fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>) {
-        let first = blocks.len();
-        self.uniform.row(site, blocks);
-        let mut sums = [[[0f32; 3]; 3]; 27];
-        for (e, factor) in self.factors(site) {
-            for c in self.uniform.couplings.of(1 << e) {
-                let sum = &mut sums[3 * c.row as usize + c.dx as usize];
-                for a in 0..3 {
-                    (0..3).for_each(|b| sum[a][b] += factor * c.block[a][b]);
+    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
+        let mut graded = Vec::with_capacity(27);
+        self.uniform.each_row(sites, &mut |site, columns, _| {
+            let mut sums = [[[0f32; 3]; 3]; 27];
+            for (e, factor) in self.factors(site) {
+                let (places, blocks) = self.uniform.couplings.of(1 << e);
+                for (place, block) in places.iter().zip(blocks) {
+                    let sum = &mut sums[place.index()];
+                    for a in 0..3 {
+                        (0..3).for_each(|b| sum[a][b] += factor * block[a][b]);
+                    }
                 }
             }
-        }
-        let neighbours = self.uniform.couplings.of(self.uniform.mesh.around[site]);
-        for (c, entry) in neighbours.iter().zip(&mut blocks[first..]) {
-            entry.1 = sums[3 * c.row as usize + c.dx as usize];
-        }
+            let (places, _) = self.uniform.couplings.of(self.uniform.mesh.around[site]);
+            graded.clear();
+            graded.extend(places.iter().map(|p| sums[p.index()]));
+            visit(site, columns, &graded);
+        });
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        self.uniform.reach(sites)
+    }
+
+    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        let Hex8 { mesh, double, .. } = &self.uniform;
+        kernel::graded_f64(mesh, double, &self.factor, sites, x, y);
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
         let Hex8 { mesh, single, .. } = &self.uniform;
         kernel::graded_f32(mesh, single, &self.factor, sites, x, y);
+    }
+
+    fn eigenvalue_bound(&self) -> f64 {
+        self.uniform.eigenvalue_bound()
     }
 }

@@ -23,6 +23,8 @@ pub struct Hex8 {
     double: Stencils<f64>,
     single: Stencils<f32>,
     couplings: Couplings,
+    /// Of one element, so of all together.
+    eigenvalue_bound: f64,
 }
 
 impl Hex8 {
@@ -34,6 +36,7 @@ impl Hex8 {
             mesh,
             single: double.to_f32(),
             couplings: Couplings::new(&double),
+            eigenvalue_bound: element::eigenvalue_bound(&k),
             double,
         }
     }
@@ -47,7 +50,7 @@ impl Operator<3> for Hex8 {
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         y.par_chunks_mut(par::CHUNK).enumerate().for_each(|(c, y)| {
             let start = c * par::CHUNK;
-            kernel::rows_f64(&self.mesh, &self.double, start..start + y.len(), x, y);
+            self.rows_f64(start..start + y.len(), x, y);
         });
     }
 
@@ -59,24 +62,46 @@ impl Operator<3> for Hex8 {
 }
 
 impl Coarsen for Hex8 {
-    fn position(&self, site: usize) -> [f64; 3] {
-        self.mesh.position(site)
+    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
+        let h = self.mesh.grid.spacing_mm;
+        for segment in self.mesh.segments_in(sites.clone()) {
+            let own = segment.nodes();
+            let out = &mut x[own.start - sites.start..own.end - sites.start];
+            for (i, x) in (0u32..).zip(out) {
+                let at = [segment.at[0] + i, segment.at[1], segment.at[2]];
+                *x = std::array::from_fn(|a| f64::from(at[a]) * h[a]);
+            }
+        }
     }
 
-    fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>) {
-        let around = self.mesh.around[site];
-        let Some(segment) = self.mesh.segments_in(site..site + 1).next() else {
-            return;
-        };
-        let neighbours = self.couplings.of(around).iter();
-        blocks.extend(neighbours.map(|c| {
-            let column = segment.rows[c.row as usize] + u32::from(c.dx) - 1;
-            (column, c.block)
-        }));
+    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
+        let mut columns = Vec::with_capacity(27);
+        for segment in self.mesh.segments_in(sites) {
+            for (i, node) in (0u32..).zip(segment.nodes()) {
+                let (places, blocks) = self.couplings.of(self.mesh.around[node]);
+                columns.clear();
+                columns.extend(places.iter().map(|p| {
+                    segment.rows[p.row as usize] + i + u32::from(p.dx) - 1
+                }));
+                visit(node, &columns, blocks);
+            }
+        }
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        self.mesh.reach(sites)
+    }
+
+    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        kernel::rows_f64(&self.mesh, &self.double, sites, x, y);
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
         kernel::rows_f32(&self.mesh, &self.single, sites, x, y);
+    }
+
+    fn eigenvalue_bound(&self) -> f64 {
+        self.eigenvalue_bound
     }
 }
 
@@ -163,12 +188,13 @@ mod tests {
         let x = vector(op.sites());
         let mut y = vec![[0.0; 3]; x.len()];
         op.apply(&x, &mut y);
-        let mut blocks = Vec::new();
-        for (site, y) in y.iter().enumerate() {
-            blocks.clear();
-            op.row(site, &mut blocks);
-            let mut sum = [0.0; 3];
-            for (column, block) in &blocks {
+        let mut sites = 0..op.sites();
+        op.each_row(0..op.sites(), &mut |site, columns, blocks| {
+            assert_eq!(sites.next(), Some(site));
+            let (mut sum, y) = ([0.0; 3], y[site]);
+            for (column, block) in columns.iter().zip(blocks) {
+                let reach = op.reach(site..site + 1);
+                assert!(reach.contains(&(*column as usize)));
                 for a in 0..3 {
                     for b in 0..3 {
                         sum[a] += f64::from(block[a][b]) * x[*column as usize][b];
@@ -176,7 +202,8 @@ mod tests {
                 }
             }
             assert!((0..3).all(|a| (sum[a] - y[a]).abs() < 1e-4));
-        }
+        });
+        assert_eq!(sites.next(), None);
     }
 
     fn worst(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {

@@ -61,39 +61,51 @@ impl Stencils<f64> {
 #[derive(Debug, Clone)]
 pub struct Couplings {
     starts: Vec<u32>,
-    all: Vec<Coupling>,
+    places: Vec<Place>,
+    blocks: Vec<Block>,
 }
 
-/// The block that couples a node to its neighbour at `dx` (0, 1 or 2) in a row of neighbours.
+/// Which neighbour: the one at `dx` (0, 1 or 2) in a row of neighbours.
 #[derive(Debug, Clone, Copy)]
-pub struct Coupling {
+pub struct Place {
     pub row: u8,
     pub dx: u8,
-    pub block: Block,
+}
+
+impl Place {
+    /// Its number among the 27.
+    pub fn index(self) -> usize {
+        3 * self.row as usize + self.dx as usize
+    }
 }
 
 impl Couplings {
     pub fn new(stencils: &Stencils<f64>) -> Self {
-        let (mut starts, mut all) = (vec![0], Vec::new());
+        let (mut starts, mut places, mut blocks) = (vec![0], Vec::new(), Vec::new());
         for around in 0..=255u8 {
             for i in 0..27usize {
                 let (row, dx) = (i / 3, i % 3);
                 if shares_element(around, [dx, row % 3, row / 3]) {
-                    all.push(Coupling {
+                    places.push(Place {
                         row: row as u8,
                         dx: dx as u8,
-                        block: stencils.block(around, row, dx),
                     });
+                    blocks.push(stencils.block(around, row, dx));
                 }
             }
-            starts.push(all.len() as u32);
+            starts.push(places.len() as u32);
         }
-        Couplings { starts, all }
+        Couplings {
+            starts,
+            places,
+            blocks,
+        }
     }
 
-    pub fn of(&self, around: u8) -> &[Coupling] {
+    pub fn of(&self, around: u8) -> (&[Place], &[Block]) {
         let i = around as usize;
-        &self.all[self.starts[i] as usize..self.starts[i + 1] as usize]
+        let range = self.starts[i] as usize..self.starts[i + 1] as usize;
+        (&self.places[range.clone()], &self.blocks[range])
     }
 }
 

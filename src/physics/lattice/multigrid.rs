@@ -8,6 +8,7 @@ use super::{Lattice, PORTION, quad, range, springs};
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen};
 use crate::simd::{Isa, isa};
+use crate::topology::sites::Sites;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -50,7 +51,7 @@ impl Operator<3> for Springs<'_> {
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         y.par_chunks_mut(PORTION).enumerate().for_each(|(c, y)| {
-            self.lattice.springs(range(c, y.len()), x, y);
+            self.rows_f64(range(c, y.len()), x, y);
         });
     }
 
@@ -78,22 +79,44 @@ impl Springs<'_> {
 }
 
 impl Coarsen for Springs<'_> {
-    fn position(&self, site: usize) -> [f64; 3] {
-        let sites = self.lattice.sites;
-        sites.frame.position_mm(sites.indices[site])
+    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
+        let Sites { frame, indices, .. } = self.lattice.sites;
+        for (x, at) in x.iter_mut().zip(&indices[sites]) {
+            *x = frame.position_mm(*at);
+        }
     }
 
-    fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>) {
-        let mut own = [[0.0; 3]; 3];
-        self.each_bond(site, |end, block| {
-            for a in 0..3 {
-                for b in 0..3 {
-                    own[a][b] += block[a][b];
+    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
+        let (mut columns, mut blocks) = (Vec::with_capacity(19), Vec::with_capacity(19));
+        for site in sites {
+            let mut own = [[0.0; 3]; 3];
+            columns.clear();
+            blocks.clear();
+            self.each_bond(site, |end, block| {
+                for a in 0..3 {
+                    (0..3).for_each(|b| own[a][b] += block[a][b]);
                 }
-            }
-            blocks.push((end as u32, block.map(|r| r.map(|v| -v as f32))));
-        });
-        blocks.push((site as u32, own.map(|r| r.map(|v| v as f32))));
+                columns.push(end as u32);
+                blocks.push(block.map(|r| r.map(|v| -v as f32)));
+            });
+            columns.push(site as u32);
+            blocks.push(own.map(|r| r.map(|v| v as f32)));
+            visit(site, &columns, &blocks);
+        }
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        let mut reach = sites.clone();
+        for (site, p) in sites.flat_map(|s| (0..self.lattice.pairs.len()).map(move |p| (s, p))) {
+            let (plus, minus) = self.lattice.ends(site, p);
+            reach.start = reach.start.min(plus).min(minus);
+            reach.end = reach.end.max(plus + 1).max(minus + 1);
+        }
+        reach
+    }
+
+    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        self.lattice.springs(sites, x, y);
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
@@ -111,5 +134,10 @@ impl Coarsen for Springs<'_> {
                 _ => springs::<quad::Plain32>(bonds, weights, sites, x, y),
             }
         }
+    }
+
+    /// Of one spring, `(u_i − u_j)² <= 2 u_i² + 2 u_j²`.
+    fn eigenvalue_bound(&self) -> f64 {
+        2.0
     }
 }

@@ -1,230 +1,176 @@
-//! Owns aggregation: which sites move as one on the next coarser level.
+//! Owns which site moves with which aggregate, and sums over aggregates.
 //!
-//! On the finest level, boxes of space, each split into its connected pieces, so that struts that pass close by do not
-//! stick together; scraps join the neighbour they are tied to most. On coarser levels, a site and all its neighbours.
+//! Sites are told in chunks, each with the list of the few aggregates that it has part in: a site's own entry is two
+//! bytes, and sums go chunk by chunk, then list by list, in an order that does not depend on the number of threads.
 
 use super::level::NONE;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::ops::Range;
 
-/// Sites below which a piece of a box is a scrap.
-const SCRAP: usize = 8;
+/// Sites per chunk.
+pub const CHUNK: usize = 2048;
+
+const NOWHERE: u16 = u16::MAX;
 
 /// Sites by aggregate.
 #[derive(Debug, Clone)]
 pub struct Aggregates {
-    /// Per site its aggregate, or [`NONE`].
-    pub of: Vec<u32>,
     pub count: usize,
-    /// Sites aggregate by aggregate, and where each aggregate's begin (one more at the end).
-    pub members: Vec<u32>,
-    pub starts: Vec<u32>,
+    /// Per site the place of its aggregate in its chunk's list, or [`NOWHERE`].
+    places: Vec<u16>,
+    /// Aggregates of the chunks, list after list.
+    lists: Vec<u32>,
+    /// Where each chunk's list begins; one more at the end.
+    starts: Vec<u32>,
+    /// Per aggregate where it is in `lists`, in order, and where each aggregate's entries begin.
+    entries: Vec<u32>,
+    entry_starts: Vec<u32>,
+}
+
+/// The sums of one chunk.
+pub struct Sums<'a, T> {
+    start: usize,
+    places: &'a [u16],
+    sums: &'a mut [T],
+}
+
+impl<T> Sums<'_, T> {
+    /// The sum that a site of the chunk adds to; None for a site without an aggregate.
+    #[inline]
+    pub fn of(&mut self, site: usize) -> Option<&mut T> {
+        self.sums.get_mut(self.places[site - self.start] as usize)
+    }
 }
 
 impl Aggregates {
-    fn new(of: Vec<u32>, count: usize) -> Self {
-        let mut starts = vec![0u32; count + 1];
-        for &a in of.iter().filter(|&&a| a != NONE) {
-            starts[a as usize + 1] += 1;
+    /// From each site's aggregate, or [`NONE`].
+    pub fn new(of: &[u32], count: usize) -> Self {
+        let chunks: Vec<(Vec<u16>, Vec<u32>)> = of.par_chunks(CHUNK).map(places).collect();
+        let mut all = Aggregates {
+            count,
+            places: Vec::with_capacity(of.len()),
+            lists: Vec::new(),
+            starts: vec![0],
+            entries: Vec::new(),
+            entry_starts: vec![0; count + 1],
+        };
+        for (places, list) in chunks {
+            all.places.extend(places);
+            all.lists.extend(list);
+            all.starts.push(all.lists.len() as u32);
+        }
+        for &a in &all.lists {
+            all.entry_starts[a as usize + 1] += 1;
         }
         for a in 0..count {
-            starts[a + 1] += starts[a];
+            all.entry_starts[a + 1] += all.entry_starts[a];
         }
-        let mut next = starts.clone();
-        let mut members = vec![0; starts[count] as usize];
-        for (site, &a) in of.iter().enumerate() {
+        let mut next = all.entry_starts.clone();
+        all.entries = vec![0; all.lists.len()];
+        for (i, &a) in all.lists.iter().enumerate() {
+            all.entries[next[a as usize] as usize] = i as u32;
+            next[a as usize] += 1;
+        }
+        all
+    }
+
+    /// Number of sites that have an aggregate.
+    pub fn sites(&self) -> usize {
+        self.places.par_iter().filter(|p| **p != NOWHERE).count()
+    }
+
+    pub fn bytes(&self) -> usize {
+        2 * self.places.len() + 4 * (2 * self.lists.len() + self.starts.len() + self.count)
+    }
+
+    /// The aggregate of a site, or [`NONE`].
+    #[inline]
+    pub fn of(&self, site: usize) -> u32 {
+        match self.places[site] {
+            NOWHERE => NONE,
+            place => self.lists[self.starts[site / CHUNK] as usize + place as usize],
+        }
+    }
+
+    /// `out[a] = Σ` over the sites of aggregate `a`; `visit` adds what the sites of one chunk have.
+    pub fn sum<T: Copy + Send + Sync>(
+        &self,
+        out: &mut [T],
+        zero: T,
+        visit: impl Fn(Range<usize>, &mut Sums<T>) + Sync,
+        add: impl Fn(&mut T, &T) + Sync,
+    ) {
+        let mut parts = vec![zero; self.lists.len()];
+        let mut chunks = Vec::with_capacity(self.starts.len());
+        let mut rest = &mut parts[..];
+        for ends in self.starts.windows(2) {
+            let (here, others) = rest.split_at_mut((ends[1] - ends[0]) as usize);
+            chunks.push(here);
+            rest = others;
+        }
+        chunks.into_par_iter().enumerate().for_each(|(c, sums)| {
+            let start = c * CHUNK;
+            let sites = start..(start + CHUNK).min(self.places.len());
+            let places = &self.places[sites.clone()];
+            visit(
+                sites,
+                &mut Sums {
+                    start,
+                    places,
+                    sums,
+                },
+            );
+        });
+        let sum = |(a, out): (usize, &mut T)| {
+            *out = zero;
+            let own = self.entry_starts[a] as usize..self.entry_starts[a + 1] as usize;
+            for &entry in &self.entries[own] {
+                add(out, &parts[entry as usize]);
+            }
+        };
+        out.par_iter_mut()
+            .with_min_len(64)
+            .enumerate()
+            .for_each(sum);
+    }
+}
+
+/// The places of one chunk's sites in the list of its aggregates.
+fn places(of: &[u32]) -> (Vec<u16>, Vec<u32>) {
+    let mut list: Vec<u32> = of.iter().copied().filter(|&a| a != NONE).collect();
+    list.sort_unstable();
+    list.dedup();
+    let place = |a: &u32| list.binary_search(a).map_or(NOWHERE, |p| p as u16);
+    (of.iter().map(place).collect(), list)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_are_those_of_each_aggregates_sites() {
+        let of: Vec<u32> = (0..3 * CHUNK as u32 + 17)
+            .map(|i| if i % 11 == 3 { NONE } else { i * 7 % 5003 % 900 })
+            .collect();
+        let all = Aggregates::new(&of, 900);
+        let mut expected = vec![0u64; 900];
+        for (i, &a) in of.iter().enumerate() {
+            assert_eq!(all.of(i), a);
             if a != NONE {
-                members[next[a as usize] as usize] = site as u32;
-                next[a as usize] += 1;
+                expected[a as usize] += i as u64;
             }
         }
-        Aggregates {
-            of,
-            count,
-            members,
-            starts,
-        }
-    }
-
-    pub fn members(&self, aggregate: usize) -> &[u32] {
-        &self.members[self.starts[aggregate] as usize..self.starts[aggregate + 1] as usize]
-    }
-
-    /// Connected pieces of boxes. `boxes[i]` is a site's box, or [`NONE`] to leave it out; `neighbours` replaces
-    /// the list it is given by the sites that site `i` is coupled to.
-    pub fn in_boxes(boxes: &[u32], neighbours: impl Fn(usize, &mut Vec<u32>) + Sync) -> Self {
-        let mut root = join_in_boxes(boxes, &neighbours);
-        let mut size = vec![0u32; boxes.len()];
-        for i in 0..boxes.len() {
-            let r = find(&mut root, i as u32);
-            size[r as usize] += 1;
-        }
-        join_scraps(boxes, &mut root, &mut size, &neighbours);
-        let mut number = vec![NONE; boxes.len()];
-        let mut of = vec![NONE; boxes.len()];
-        let mut count = 0;
-        for i in 0..boxes.len() {
-            if boxes[i] == NONE {
-                continue;
-            }
-            let r = find(&mut root, i as u32) as usize;
-            if number[r] == NONE {
-                number[r] = count;
-                count += 1;
-            }
-            of[i] = number[r];
-        }
-        Aggregates::new(of, count as usize)
-    }
-
-    /// A site and its neighbours, wherever all of them are still free; the rest join the aggregate they are coupled
-    /// to most. `neighbours` replaces the list by (site, strength of the coupling), itself left out.
-    pub fn greedy(sites: usize, neighbours: impl Fn(usize, &mut Vec<(u32, f32)>)) -> Self {
-        let mut of = vec![NONE; sites];
-        let mut count = 0u32;
-        let mut list = Vec::new();
-        for i in 0..sites {
-            if of[i] != NONE {
-                continue;
-            }
-            neighbours(i, &mut list);
-            if list.is_empty() || list.iter().any(|&(j, _)| of[j as usize] != NONE) {
-                continue;
-            }
-            of[i] = count;
-            list.iter().for_each(|&(j, _)| of[j as usize] = count);
-            count += 1;
-        }
-        let roots = of.clone();
-        for i in 0..sites {
-            if of[i] == NONE {
-                neighbours(i, &mut list);
-                of[i] = strongest(&list, &roots);
-            }
-        }
-        for i in 0..sites {
-            if of[i] != NONE {
-                continue;
-            }
-            neighbours(i, &mut list);
-            of[i] = count;
-            for &(j, _) in &list {
-                if of[j as usize] == NONE {
-                    of[j as usize] = count;
+        let mut sums = vec![1u64; 900];
+        let visit = |sites: Range<usize>, sums: &mut Sums<u64>| {
+            for i in sites {
+                if let Some(s) = sums.of(i) {
+                    *s += i as u64;
                 }
             }
-            count += 1;
-        }
-        Aggregates::new(of, count as usize)
-    }
-}
-
-/// Sites per task.
-const CHUNK: usize = 1 << 17;
-
-/// Joins coupled sites of the same box: chunks of sites on their own, then across chunks.
-fn join_in_boxes(boxes: &[u32], neighbours: &(impl Fn(usize, &mut Vec<u32>) + Sync)) -> Vec<u32> {
-    let mut root: Vec<u32> = (0..boxes.len() as u32).collect();
-    let chunk = CHUNK.min(boxes.len() / 8 + 1);
-    let across: Vec<Vec<(u32, u32)>> = root
-        .par_chunks_mut(chunk)
-        .enumerate()
-        .map(|(c, part)| {
-            let start = c * chunk;
-            // Numbered from zero while the chunk is on its own.
-            part.iter_mut().for_each(|r| *r -= start as u32);
-            let (mut list, mut across) = (Vec::new(), Vec::new());
-            for i in start..start + part.len() {
-                if boxes[i] == NONE {
-                    continue;
-                }
-                neighbours(i, &mut list);
-                for &j in &list {
-                    if j as usize >= i || boxes[j as usize] != boxes[i] {
-                        continue;
-                    }
-                    if j as usize >= start {
-                        join(part, (i - start) as u32, j - start as u32);
-                    } else {
-                        across.push((i as u32, j));
-                    }
-                }
-            }
-            part.iter_mut().for_each(|r| *r += start as u32);
-            across
-        })
-        .collect();
-    for (i, j) in across.into_iter().flatten() {
-        join(&mut root, i, j);
-    }
-    root
-}
-
-fn strongest(list: &[(u32, f32)], of: &[u32]) -> u32 {
-    let mut best = (NONE, 0.0);
-    for &(j, strength) in list {
-        if of[j as usize] != NONE && strength > best.1 {
-            best = (of[j as usize], strength);
-        }
-    }
-    best.0
-}
-
-fn find(root: &mut [u32], mut i: u32) -> u32 {
-    while root[i as usize] != i {
-        root[i as usize] = root[root[i as usize] as usize];
-        i = root[i as usize];
-    }
-    i
-}
-
-fn join(root: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(root, a), find(root, b));
-    root[a.max(b) as usize] = a.min(b);
-}
-
-/// Joins every scrap to the piece it has most couplings with.
-fn join_scraps(
-    boxes: &[u32],
-    root: &mut [u32],
-    size: &mut [u32],
-    neighbours: &impl Fn(usize, &mut Vec<u32>),
-) {
-    let mut members: HashMap<u32, Vec<u32>> = HashMap::new();
-    let mut order = Vec::new();
-    for i in 0..boxes.len() as u32 {
-        let r = find(root, i);
-        if boxes[i as usize] != NONE && (size[r as usize] as usize) < SCRAP {
-            let list = members.entry(r).or_insert_with(|| {
-                order.push(r);
-                Vec::new()
-            });
-            list.push(i);
-        }
-    }
-    let mut list = Vec::new();
-    for r in order {
-        let own = find(root, r);
-        if size[own as usize] as usize >= SCRAP {
-            continue; // another scrap has joined it
-        }
-        let mut ties: Vec<(u32, u32)> = Vec::new();
-        for &i in &members[&r] {
-            neighbours(i as usize, &mut list);
-            for &j in list.iter().filter(|&&j| boxes[j as usize] != NONE) {
-                let other = find(root, j);
-                match ties.iter_mut().find(|t| t.0 == other) {
-                    _ if other == own => {}
-                    Some(t) => t.1 += 1,
-                    None => ties.push((other, 1)),
-                }
-            }
-        }
-        let most = ties.iter().max_by_key(|t| (t.1, std::cmp::Reverse(t.0)));
-        if let Some(&(other, _)) = most {
-            let both = size[own as usize] + size[other as usize];
-            join(root, own, other);
-            size[find(root, own) as usize] = both;
-        }
+        };
+        all.sum(&mut sums, 0, visit, |s, v| *s += v);
+        assert_eq!(sums, expected);
+        assert_eq!(all.sites(), of.iter().filter(|a| **a != NONE).count());
     }
 }

@@ -1,13 +1,11 @@
-//! Owns smoothing: Chebyshev polynomials in `D⁻¹A`, and the largest eigenvalue that they need.
+//! Owns smoothing: Chebyshev polynomials in `D⁻¹A`.
 //!
 //! Every site gathers and writes only itself, so the smoother is symmetric and the same on any number of threads.
 //! Rows are made a chunk at a time and used while they are in the cache.
 
+pub use super::aggregate::CHUNK;
 use super::level::Level;
 use rayon::prelude::*;
-
-/// Sites per task.
-pub const CHUNK: usize = 2048;
 
 /// Coefficients of `x₊ = x + momentum (x − x₋) + step D⁻¹(b − A x)`, one pair a degree.
 #[derive(Debug, Clone)]
@@ -103,60 +101,4 @@ fn sweep<const D: usize>(
                 }
             }
         });
-}
-
-/// The largest eigenvalue of `D⁻¹A` to a few percent from below, by power iteration.
-pub fn largest_eigenvalue<const D: usize>(level: &impl Level<D>) -> f32 {
-    let n = level.sites();
-    let mut x: Vec<[f32; D]> = (0..n)
-        .into_par_iter()
-        .map(|i| {
-            let noise: [f32; D] = std::array::from_fn(|d| noise((i * D + d) as u32));
-            level.scale(i, &noise)
-        })
-        .collect();
-    let mut y = vec![[0.0; D]; n];
-    let mut largest = 0.0;
-    for _ in 0..POWER_STEPS {
-        // (x, A D⁻¹ A x) / (x, A x) lies nearer the largest than (x, A x) / (x, D x).
-        let parts: Vec<(f64, f64)> = y
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .map(|(c, y)| {
-                let start = c * CHUNK;
-                let mut rows = [[0.0; D]; CHUNK];
-                let rows = &mut rows[..y.len()];
-                level.rows(start..start + y.len(), &x, rows);
-                let (mut top, mut bottom) = (0.0, 0.0);
-                for (i, (y, row)) in y.iter_mut().zip(rows).enumerate() {
-                    *y = level.scale(start + i, row);
-                    for d in 0..D {
-                        top += f64::from(row[d] * y[d]);
-                        bottom += f64::from(row[d] * x[start + i][d]);
-                    }
-                }
-                (top, bottom)
-            })
-            .collect();
-        let top: f64 = parts.iter().map(|p| p.0).sum();
-        let bottom: f64 = parts.iter().map(|p| p.1).sum();
-        if !(top > 0.0 && bottom > 0.0) {
-            break;
-        }
-        largest = (top / bottom) as f32;
-        let shrink = largest.recip();
-        y.par_iter_mut().for_each(|y| *y = y.map(|v| v * shrink));
-        std::mem::swap(&mut x, &mut y);
-    }
-    largest
-}
-
-const POWER_STEPS: usize = 15;
-
-/// A number between −1 and 1 that looks random, the same on every machine.
-fn noise(i: u32) -> f32 {
-    let mut h = i.wrapping_mul(0x9E37_79B9) ^ 0x5bd1_e995;
-    h = (h ^ (h >> 15)).wrapping_mul(0x85EB_CA6B);
-    h = (h ^ (h >> 13)).wrapping_mul(0xC2B2_AE35);
-    (h ^ (h >> 16)) as f32 / u32::MAX as f32 * 2.0 - 1.0
 }

@@ -1,8 +1,10 @@
 //! Owns the assembled levels: six unknowns per site, the rigid motions of what it stands for.
 
-use super::aggregate::Aggregates;
-use super::blocks::{Block6, BlockMatrix};
+use super::aggregate::{Aggregates, Sums};
+use super::blocks::{self, Block6, BlockMatrix};
+use super::eigenvalue;
 use super::fine::Body;
+use super::grouping;
 use super::level::{Level, Modes, Six};
 use super::rigid::{self, Mat6};
 use rayon::prelude::*;
@@ -12,27 +14,29 @@ pub struct Coarse {
     pub matrix: BlockMatrix,
     /// Inverse diagonal blocks.
     inverse: Vec<Block6>,
-    pub aggregates: Aggregates,
+    aggregates: Aggregates,
     /// Orthonormal motions of a site's aggregate.
     modes: Vec<Block6>,
 }
 
 impl Coarse {
-    /// A level over `bodies`, aggregated by its own graph; the bodies of the next.
-    pub fn new(matrix: BlockMatrix, bodies: &[Body]) -> (Self, Vec<Body>) {
+    /// A level over `bodies`, aggregated by its own graph; the bodies of the next. `gross` tells of each site how stiff
+    /// its parts are, see [`gross`].
+    pub fn new(matrix: BlockMatrix, bodies: &[Body], gross: &[f32]) -> (Self, Vec<Body>) {
         let inverse: Vec<Block6> = (0..matrix.rows())
             .into_par_iter()
-            .map(|i| inverse_block(&matrix, i))
+            .map(|i| inverse_block(matrix.diagonal(i), gross[i]))
             .collect();
-        let aggregates = Aggregates::greedy(matrix.rows(), |i, list| strengths(&matrix, i, list));
-        let next: Vec<Body> = (0..aggregates.count)
-            .into_par_iter()
-            .map(|a| joined(aggregates.members(a), bodies))
-            .collect();
+        let (of, count) = grouping::greedy(matrix.rows(), |i, list| strengths(&matrix, i, list));
+        let mut members = vec![Vec::new(); count];
+        for (i, &a) in of.iter().enumerate() {
+            members[a as usize].push(i as u32);
+        }
+        let next: Vec<Body> = members.par_iter().map(|m| joined(m, bodies)).collect();
         let modes = (0..matrix.rows())
             .into_par_iter()
             .map(|i| {
-                let whole = &next[aggregates.of[i] as usize];
+                let whole = &next[of[i] as usize];
                 let q = rigid::multiply(&carried(&bodies[i], whole), &whole.basis.basis);
                 std::array::from_fn(|k| q[k % 6][k / 6] as f32)
             })
@@ -40,14 +44,14 @@ impl Coarse {
         let level = Coarse {
             matrix,
             inverse,
-            aggregates,
+            aggregates: Aggregates::new(&of, count),
             modes,
         };
         (level, next)
     }
 
     pub fn bytes(&self) -> usize {
-        self.matrix.bytes() + self.inverse.len() * 2 * 144 + self.aggregates.of.len() * 8
+        self.matrix.bytes() + self.inverse.len() * 2 * 144 + self.aggregates.bytes()
     }
 }
 
@@ -93,7 +97,7 @@ fn joined(members: &[u32], bodies: &[Body]) -> Body {
 /// Couplings of a site, each with the Frobenius norm of its block scaled by the diagonals.
 fn strengths(matrix: &BlockMatrix, i: usize, list: &mut Vec<(u32, f32)>) {
     list.clear();
-    for (j, block) in matrix.row(i) {
+    for (j, block, _) in matrix.row(i) {
         if j as usize != i {
             let norm = block.iter().map(|v| v * v).sum::<f32>().sqrt();
             list.push((j, norm));
@@ -101,15 +105,36 @@ fn strengths(matrix: &BlockMatrix, i: usize, list: &mut Vec<(u32, f32)>) {
     }
 }
 
-/// Inverse of a diagonal block; unknowns without stiffness (dropped motions) get zero rows and columns.
-fn inverse_block(matrix: &BlockMatrix, i: usize) -> Block6 {
-    let mut a = [[0.0; 6]; 6];
-    for (_, block) in matrix.row(i).filter(|(j, _)| *j as usize == i) {
-        a = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(block[6 * c + r])));
-    }
-    let b = rigid::orthonormalise_to(&a, 0.0, 1e-5).basis;
+/// The stiffness of each aggregate's sites, on average: what the stiffness of the aggregate as a whole is the small
+/// remainder of, so that its rounding is that of this.
+pub fn gross<const D: usize>(level: &impl Level<D>) -> Vec<f32> {
+    let mut sums = vec![[0f32; 2]; level.aggregates().count];
+    let visit = |sites: Range<usize>, sums: &mut Sums<[f32; 2]>| {
+        for site in sites {
+            if let Some([stiffness, sites]) = sums.of(site) {
+                *stiffness += level.stiffness(site);
+                *sites += 1.0;
+            }
+        }
+    };
+    level.aggregates().sum(&mut sums, [0.0; 2], visit, |s, p| {
+        *s = [s[0] + p[0], s[1] + p[1]];
+    });
+    sums.iter().map(|[stiffness, sites]| stiffness / sites).collect()
+}
+
+/// Share of the gross stiffness below which a motion's own is rounding: it is a mechanism, or held.
+pub const LEAST_STIFFNESS: f64 = 1e-5;
+
+/// Inverse of a diagonal block; unknowns without stiffness get zero rows and columns.
+fn inverse_block(block: &Block6, gross: f32) -> Block6 {
+    let a = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(block[6 * c + r])));
+    let b = rigid::orthonormalise_to(&a, f64::from(gross), LEAST_STIFFNESS).basis;
     std::array::from_fn(|k| (0..6).map(|m| b[k % 6][m] * b[k / 6][m]).sum::<f64>() as f32)
 }
+
+/// Over the eigenvalue that is found from below.
+const MARGIN: f32 = 1.1;
 
 fn times(block: &Block6, r: &Six) -> Six {
     let mut out = [0.0; 6];
@@ -130,11 +155,25 @@ impl Level<6> for Coarse {
         self.matrix.multiply(sites, x, y);
     }
 
-    fn row(&self, site: usize, blocks: &mut Vec<(u32, [Six; 6])>) {
-        for (j, block) in self.matrix.row(site) {
-            let square = std::array::from_fn(|r| std::array::from_fn(|c| block[6 * c + r]));
-            blocks.push((j, square));
+    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[[Six; 6]])) {
+        let (mut columns, mut squares) = (Vec::new(), Vec::new());
+        for site in sites {
+            columns.clear();
+            squares.clear();
+            for (j, block, transposed) in self.matrix.row(site) {
+                // Stored by columns: by rows, what is stored is the transposed block.
+                let by_rows = if transposed { *block } else { blocks::mirrored(block) };
+                let row = |r: usize| std::array::from_fn(|c| by_rows[6 * r + c]);
+                columns.push(j);
+                squares.push(std::array::from_fn(row));
+            }
+            visit(site, &columns, &squares);
         }
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        let columns = sites.clone().flat_map(|i| self.matrix.row(i));
+        columns.fold(sites, |r, (j, ..)| r.start.min(j as usize)..r.end.max(j as usize + 1))
     }
 
     #[inline]
@@ -142,14 +181,31 @@ impl Level<6> for Coarse {
         times(&self.inverse[site], r)
     }
 
+    /// The inverse drops what has no stiffness.
     #[inline]
-    fn aggregate(&self, site: usize) -> u32 {
-        self.aggregates.of[site]
+    fn unscale(&self, _: usize, _: &Six) -> Option<Six> {
+        None
+    }
+
+    fn stiffness(&self, site: usize) -> f32 {
+        let block = self.matrix.diagonal(site);
+        (0..6).map(|k| block[7 * k]).sum::<f32>() / 6.0
+    }
+
+    fn aggregates(&self) -> &Aggregates {
+        &self.aggregates
     }
 
     #[inline]
-    fn modes(&self, site: usize) -> Modes<6> {
-        let q = &self.modes[site];
-        std::array::from_fn(|r| std::array::from_fn(|c| if c < 6 { q[6 * c + r] } else { 0.0 }))
+    fn each_modes(&self, sites: Range<usize>, mut visit: impl FnMut(usize, Modes<6>)) {
+        for site in sites {
+            let q = &self.modes[site];
+            let row = |r: usize| std::array::from_fn(|c| if c < 6 { q[6 * c + r] } else { 0.0 });
+            visit(site, std::array::from_fn(row));
+        }
+    }
+
+    fn eigenvalue_bound(&self) -> f32 {
+        MARGIN * eigenvalue::largest(self)
     }
 }

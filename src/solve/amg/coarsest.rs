@@ -5,6 +5,7 @@
 //! generalised inverse, exact on what is stiff; a small shift instead would blow the free motions up by its inverse.
 
 use super::blocks::BlockMatrix;
+use super::coarse::LEAST_STIFFNESS;
 use super::level::Six;
 
 /// Pivots below this share of the unit diagonal are rounding of the single-precision matrix.
@@ -21,16 +22,18 @@ pub struct Coarsest {
 }
 
 impl Coarsest {
-    pub fn new(matrix: &BlockMatrix) -> Self {
+    /// `gross`: as for [`super::coarse::Coarse::new`].
+    pub fn new(matrix: &BlockMatrix, gross: &[f32]) -> Self {
         let n = 6 * matrix.rows();
-        let scale = unit_scaling(matrix);
+        let scale = unit_scaling(matrix, gross);
         let mut a = vec![0.0; n * n];
         for i in 0..matrix.rows() {
-            for (j, block) in matrix.row(i) {
+            for (j, block, transposed) in matrix.row(i) {
                 for c in 0..6 {
                     for r in 0..6 {
                         let (p, q) = (6 * i + r, 6 * j as usize + c);
-                        a[q * n + p] = f64::from(block[6 * c + r]) * scale[p] * scale[q];
+                        let at = if transposed { 6 * r + c } else { 6 * c + r };
+                        a[q * n + p] = f64::from(block[at]) * scale[p] * scale[q];
                     }
                 }
             }
@@ -78,14 +81,13 @@ impl Coarsest {
     }
 }
 
-fn unit_scaling(matrix: &BlockMatrix) -> Vec<f64> {
+fn unit_scaling(matrix: &BlockMatrix, gross: &[f32]) -> Vec<f64> {
     let mut scale = vec![0.0; 6 * matrix.rows()];
     for i in 0..matrix.rows() {
-        for (_, block) in matrix.row(i).filter(|(j, _)| *j as usize == i) {
-            for c in 0..6 {
-                let d = f64::from(block[7 * c]);
-                scale[6 * i + c] = if d > 0.0 { d.sqrt().recip() } else { 0.0 };
-            }
+        for c in 0..6 {
+            let d = f64::from(matrix.diagonal(i)[7 * c]);
+            let least = LEAST_STIFFNESS * f64::from(gross[i]);
+            scale[6 * i + c] = if d > least { d.sqrt().recip() } else { 0.0 };
         }
     }
     scale

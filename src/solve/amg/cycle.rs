@@ -1,27 +1,27 @@
 //! Owns the V-cycle.
 
-use super::aggregate::Aggregates;
+use super::aggregate::Sums;
 use super::chebyshev::{CHUNK, Chebyshev};
 use super::level::{Level, NONE, Six};
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Vectors of one level, kept from cycle to cycle.
+/// Vectors of an assembled level, kept from cycle to cycle.
 #[derive(Debug, Clone)]
-pub struct Vectors<const D: usize> {
+pub struct Vectors {
     /// Right-hand side.
-    pub b: Vec<[f32; D]>,
-    pub x: Vec<[f32; D]>,
-    s: Vec<[f32; D]>,
-    t: Vec<[f32; D]>,
+    pub b: Vec<Six>,
+    pub x: Vec<Six>,
+    pub spare: Vec<Six>,
 }
 
-impl<const D: usize> Vectors<D> {
+impl Vectors {
     pub fn new(n: usize) -> Self {
+        let zero = || vec![[0.0; 6]; n];
         Vectors {
-            b: vec![[0.0; D]; n],
-            x: vec![[0.0; D]; n],
-            s: vec![[0.0; D]; n],
-            t: vec![[0.0; D]; n],
+            b: zero(),
+            x: zero(),
+            spare: zero(),
         }
     }
 }
@@ -34,73 +34,87 @@ pub struct Smoothing {
     pub omega: f32,
 }
 
-/// One cycle for `A x = b` from zero; `next` solves the coarse problem of its first argument into its second.
-pub fn cycle<const D: usize>(
+/// One cycle for `A x = b` from zero. `next(collect)` solves the coarse problem, whose right-hand side `collect` makes.
+/// Beside `b` and `x` there is one vector more, `spare`.
+pub fn cycle<'e, const D: usize>(
     level: &impl Level<D>,
-    aggregates: &Aggregates,
     how: &Smoothing,
-    v: &mut Vectors<D>,
-    next: impl FnOnce(&mut dyn FnMut(&mut [Six]), &mut dyn FnMut(&[Six])),
+    b: &[[f32; D]],
+    x: &mut Vec<[f32; D]>,
+    spare: &mut Vec<[f32; D]>,
+    next: impl FnOnce(&mut dyn FnMut(&mut [Six])) -> &'e [Six],
 ) {
-    let Vectors { b, x, s, t } = v;
-    how.smoother.start(level, b, x, s);
-    residual(level, b, x, s, t);
-    subtract_image(level, how.omega, t, s);
-    let s_now: &Vec<[f32; D]> = s;
-    let mut collect_now = |g: &mut [Six]| collect(level, aggregates, s_now, g);
-    let mut prolong = |e: &[Six]| {
-        spread(level, e, t);
-        add_prolonged(level, how.omega, t, x);
-    };
-    next(&mut collect_now, &mut prolong);
-    how.smoother.go_on(level, b, x, s);
+    how.smoother.start(level, b, x, spare);
+    scaled_residual(level, b, x, spare);
+    let correction = next(&mut |g| restrict(level, how.omega, b, x, spare, g));
+    spread(level, correction, spare);
+    add_smoothed(level, how.omega, spare, x);
+    how.smoother.go_on(level, b, x, spare);
 }
 
-/// `s = b − A x`, `t = D⁻¹ s`.
-fn residual<const D: usize>(
+/// `t = D⁻¹ (b − A x)`.
+fn scaled_residual<const D: usize>(
     level: &impl Level<D>,
     b: &[[f32; D]],
     x: &[[f32; D]],
-    s: &mut [[f32; D]],
     t: &mut [[f32; D]],
 ) {
-    s.par_chunks_mut(CHUNK)
-        .zip(t.par_chunks_mut(CHUNK))
-        .enumerate()
-        .for_each(|(c, (s, t))| {
-            let start = c * CHUNK;
-            level.rows(start..start + s.len(), x, s);
-            for (i, (s, t)) in s.iter_mut().zip(t).enumerate() {
-                for d in 0..D {
-                    s[d] = b[start + i][d] - s[d];
-                }
-                *t = level.scale(start + i, s);
-            }
-        });
-}
-
-/// `s −= ω A t`.
-fn subtract_image<const D: usize>(
-    level: &impl Level<D>,
-    omega: f32,
-    t: &[[f32; D]],
-    s: &mut [[f32; D]],
-) {
-    s.par_chunks_mut(CHUNK).enumerate().for_each(|(c, s)| {
+    t.par_chunks_mut(CHUNK).enumerate().for_each(|(c, t)| {
         let start = c * CHUNK;
-        let mut rows = [[0.0; D]; CHUNK];
-        let rows = &mut rows[..s.len()];
-        level.rows(start..start + s.len(), t, rows);
-        for (s, row) in s.iter_mut().zip(rows) {
-            for d in 0..D {
-                s[d] -= omega * row[d];
-            }
+        level.rows(start..start + t.len(), x, t);
+        for (site, t) in (start..).zip(t) {
+            let s: [f32; D] = std::array::from_fn(|d| b[site][d] - t[d]);
+            *t = level.scale(site, &s);
         }
     });
 }
 
+/// `g = P₀ᵀ (s − ω A t)`, where `s = b − A x` and `t = D⁻¹ s`. The residual is had back from `t` where that is exact,
+/// and made again elsewhere: a vector less to keep.
+fn restrict<const D: usize>(
+    level: &impl Level<D>,
+    omega: f32,
+    b: &[[f32; D]],
+    x: &[[f32; D]],
+    t: &[[f32; D]],
+    g: &mut [Six],
+) {
+    let visit = |sites: Range<usize>, sums: &mut Sums<[f32; 8]>| {
+        let start = sites.start;
+        let mut image = [[0.0; D]; CHUNK];
+        let image = &mut image[..sites.len()];
+        level.rows(sites.clone(), t, image);
+        let mut again = Vec::new();
+        if level.unscale(start, &t[start]).is_none() {
+            again.resize(sites.len(), [0.0; D]);
+            level.rows(sites.clone(), x, &mut again);
+        }
+        level.each_modes(sites, |site, modes| {
+            let Some(sum) = sums.of(site) else { return };
+            let i = site - start;
+            let s = level
+                .unscale(site, &t[site])
+                .unwrap_or_else(|| std::array::from_fn(|d| b[site][d] - again[i][d]));
+            for d in 0..D {
+                let v = s[d] - omega * image[i][d];
+                for (sum, mode) in sum.iter_mut().zip(&modes[d]) {
+                    *sum += mode * v;
+                }
+            }
+        });
+    };
+    let add = |sum: &mut [f32; 8], part: &[f32; 8]| {
+        sum.iter_mut().zip(part).for_each(|(s, p)| *s += p);
+    };
+    let mut wide = vec![[0.0; 8]; g.len()];
+    level.aggregates().sum(&mut wide, [0.0; 8], visit, add);
+    for (g, wide) in g.iter_mut().zip(&wide) {
+        g.copy_from_slice(&wide[..6]);
+    }
+}
+
 /// `x += v − ω D⁻¹ A v`.
-fn add_prolonged<const D: usize>(
+fn add_smoothed<const D: usize>(
     level: &impl Level<D>,
     omega: f32,
     v: &[[f32; D]],
@@ -120,43 +134,21 @@ fn add_prolonged<const D: usize>(
     });
 }
 
-/// `g = P₀ᵀ s`, gathered aggregate by aggregate.
-fn collect<const D: usize>(
-    level: &impl Level<D>,
-    aggregates: &Aggregates,
-    s: &[[f32; D]],
-    g: &mut [Six],
-) {
-    g.par_iter_mut()
-        .with_min_len(64)
-        .enumerate()
-        .for_each(|(a, g)| {
-            let mut sum = [0f32; 8];
-            for &i in aggregates.members(a) {
-                let modes = level.modes(i as usize);
-                for d in 0..D {
-                    for k in 0..8 {
-                        sum[k] += modes[d][k] * s[i as usize][d];
-                    }
-                }
-            }
-            g.copy_from_slice(&sum[..6]);
-        });
-}
-
 /// `v = P₀ e`.
 fn spread<const D: usize>(level: &impl Level<D>, e: &[Six], v: &mut [[f32; D]]) {
+    let aggregates = level.aggregates();
     v.par_chunks_mut(CHUNK).enumerate().for_each(|(c, v)| {
-        for (i, v) in v.iter_mut().enumerate() {
-            let site = c * CHUNK + i;
-            let aggregate = level.aggregate(site);
+        let start = c * CHUNK;
+        level.each_modes(start..start + v.len(), |site, modes| {
+            let v = &mut v[site - start];
             *v = [0.0; D];
+            let aggregate = aggregates.of(site);
             if aggregate != NONE {
-                let (modes, e) = (level.modes(site), &e[aggregate as usize]);
+                let e = &e[aggregate as usize];
                 for d in 0..D {
                     v[d] = (0..6).map(|k| modes[d][k] * e[k]).sum();
                 }
             }
-        }
+        });
     });
 }

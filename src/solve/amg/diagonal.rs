@@ -1,58 +1,144 @@
-//! Owns the inverse diagonal blocks of the finest level, one number per site: most sites have one of few blocks.
+//! Owns the diagonal blocks of the finest level: most sites have one of few blocks, so a site's own entry is two bytes.
 
 use crate::operator::coarsen::{Block, Coarsen};
+use crate::operator::held::Held;
+use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Symmetric 3 × 3: xx, yy, zz, yz, xz, xy. Zero rows and columns for held components.
 pub type Symmetric = [f32; 6];
 
-pub struct Diagonal {
-    /// The distinct blocks; the first is zero.
-    kinds: Vec<Symmetric>,
-    of: Vec<u32>,
+/// A block's inverse and the block.
+pub type Pair = [Symmetric; 2];
+
+pub enum Diagonal {
+    /// The distinct blocks, inverse and not, and each site's.
+    Few {
+        kinds: Vec<Pair>,
+        of: Vec<u16>,
+    },
+    /// An inverse block a site.
+    Each(Vec<Symmetric>),
 }
 
+/// Sites per task of the set-up.
+const CHUNK: usize = 1 << 14;
+
 impl Diagonal {
-    /// Chunks made on their own, in order.
-    pub fn from_chunks(chunks: Vec<Vec<Symmetric>>) -> Self {
-        let mut known: HashMap<[u32; 6], u32> = HashMap::new();
-        let mut kinds = vec![[0.0; 6]];
-        known.insert([0; 6], 0);
-        let mut of = Vec::with_capacity(chunks.iter().map(Vec::len).sum());
-        for block in chunks.into_iter().flatten() {
-            let kind = *known.entry(block.map(f32::to_bits)).or_insert_with(|| {
-                kinds.push(block);
-                kinds.len() as u32 - 1
+    pub fn new(operator: &impl Coarsen, held: &Held) -> Self {
+        let chunks = held.0.par_chunks(CHUNK).enumerate();
+        let few: Vec<(Vec<Pair>, Vec<u16>)> = chunks
+            .clone()
+            .map(|(c, held)| distinct(operator, c * CHUNK, held))
+            .collect();
+        Diagonal::few(few).unwrap_or_else(|| {
+            let mut all = vec![[0.0; 6]; held.0.len()];
+            all.par_chunks_mut(CHUNK).zip(chunks).for_each(|(all, (c, held))| {
+                let mut all = all.iter_mut();
+                each_pair(operator, c * CHUNK, held, |[inverse, _]| {
+                    all.next().into_iter().for_each(|a| *a = inverse);
+                });
             });
-            of.push(kind);
+            Diagonal::Each(all)
+        })
+    }
+
+    /// From each chunk's blocks and its sites' places in them; None where there are too many.
+    fn few(chunks: Vec<(Vec<Pair>, Vec<u16>)>) -> Option<Self> {
+        let mut known: HashMap<[u32; 6], u16> = HashMap::new();
+        let mut kinds = Vec::new();
+        let mut renamed = Vec::with_capacity(chunks.len());
+        for (blocks, _) in &chunks {
+            let mut names = Vec::with_capacity(blocks.len());
+            for pair in blocks {
+                let kind = *known.entry(pair[0].map(f32::to_bits)).or_insert_with(|| {
+                    kinds.push(*pair);
+                    kinds.len() as u16 - 1
+                });
+                names.push(kind);
+                if kinds.len() > MOST_KINDS {
+                    return None;
+                }
+            }
+            renamed.push(names);
         }
-        Diagonal { kinds, of }
+        let mut of = Vec::with_capacity(chunks.iter().map(|c| c.1.len()).sum());
+        for ((_, places), names) in chunks.iter().zip(&renamed) {
+            of.extend(places.iter().map(|&p| names[p as usize]));
+        }
+        Some(Diagonal::Few { kinds, of })
     }
 
     pub fn sites(&self) -> usize {
-        self.of.len()
+        match self {
+            Diagonal::Few { of, .. } => of.len(),
+            Diagonal::Each(all) => all.len(),
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        match self {
+            Diagonal::Few { kinds, of } => 48 * kinds.len() + 2 * of.len(),
+            Diagonal::Each(all) => 24 * all.len(),
+        }
     }
 
     #[inline]
-    pub fn times(&self, site: usize, r: &[f32; 3]) -> [f32; 3] {
-        let [xx, yy, zz, yz, xz, xy] = self.kinds[self.of[site] as usize];
-        [
-            xx * r[0] + xy * r[1] + xz * r[2],
-            xy * r[0] + yy * r[1] + yz * r[2],
-            xz * r[0] + yz * r[1] + zz * r[2],
-        ]
+    fn inverse(&self, site: usize) -> &Symmetric {
+        match self {
+            Diagonal::Few { kinds, of } => &kinds[of[site] as usize][0],
+            Diagonal::Each(all) => &all[site],
+        }
+    }
+
+    /// `D⁻¹ r`.
+    #[inline]
+    pub fn scale(&self, site: usize, r: &[f32; 3]) -> [f32; 3] {
+        times(self.inverse(site), r)
+    }
+
+    /// `D t` on the free components, where the blocks are kept.
+    #[inline]
+    pub fn unscale(&self, site: usize, t: &[f32; 3]) -> Option<[f32; 3]> {
+        match self {
+            Diagonal::Few { kinds, of } => Some(times(&kinds[of[site] as usize][1], t)),
+            Diagonal::Each(_) => None,
+        }
+    }
+
+    /// Roughly the mean of the diagonal on the free components.
+    pub fn stiffness(&self, site: usize) -> f32 {
+        let free: f32 = self.free(site).iter().sum();
+        let trace: f32 = self.inverse(site)[..3].iter().sum();
+        if free > 0.0 { free / trace } else { 0.0 }
     }
 
     /// 1 where a component is free, 0 where it is held or has no stiffness.
     #[inline]
     pub fn free(&self, site: usize) -> [f32; 3] {
-        let d = &self.kinds[self.of[site] as usize];
+        let d = self.inverse(site);
         [0, 1, 2].map(|c| if d[c] > 0.0 { 1.0 } else { 0.0 })
     }
 }
 
-/// The inverse of a site's diagonal block on its free components.
-pub fn inverse(block: &Block, held: u8) -> Symmetric {
+/// Kinds up to which a site's is told by two bytes: their table should stay in the cache.
+const MOST_KINDS: usize = 4096;
+
+#[inline]
+fn times([xx, yy, zz, yz, xz, xy]: &Symmetric, r: &[f32; 3]) -> [f32; 3] {
+    [
+        xx * r[0] + xy * r[1] + xz * r[2],
+        xy * r[0] + yy * r[1] + yz * r[2],
+        xz * r[0] + yz * r[1] + zz * r[2],
+    ]
+}
+
+/// Condition above which a block is taken for singular (a single bond has no stiffness across itself): single precision
+/// must have the residual back from `D D⁻¹`.
+const MOST_CONDITION: f64 = 1e4;
+
+/// The inverse of a site's diagonal block on its free components, and what it is the inverse of.
+fn pair(block: &Block, held: u8) -> Pair {
     let free = [0, 1, 2].map(|c: usize| held & (1 << c) == 0 && block[c][c] > 0.0);
     // Held components become a unit diagonal, and zero again in the inverse.
     let a = |r: usize, c: usize| match (free[r] && free[c], r == c) {
@@ -66,41 +152,43 @@ pub fn inverse(block: &Block, held: u8) -> Symmetric {
         a(p, s) * a(q, t) - a(p, t) * a(q, s)
     };
     let determinant = (0..3).map(|c| a(0, c) * minor(0, c)).sum::<f64>();
-    let scale = a(0, 0) * a(1, 1) * a(2, 2);
-    let keep = |r: usize, c: usize, v: f64| if free[r] && free[c] { v as f32 } else { 0.0 };
-    if determinant <= 1e-5 * scale {
-        // A direction without stiffness of its own (a single bond, say): the diagonal alone.
-        return std::array::from_fn(|k| {
-            if k < 3 {
-                keep(k, k, a(k, k).recip())
-            } else {
-                0.0
-            }
-        });
+    let trace = |f: &dyn Fn(usize) -> f64| (0..3).filter(|&c| free[c]).map(f).sum::<f64>();
+    let condition = trace(&|c| a(c, c)) * trace(&|c| minor(c, c) / determinant);
+    let symmetric = |f: &dyn Fn(usize, usize) -> f64| {
+        [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)].map(|(r, c)| {
+            if free[r] && free[c] { f(r, c) as f32 } else { 0.0 }
+        })
+    };
+    if determinant > 0.0 && condition < MOST_CONDITION {
+        return [symmetric(&|r, c| minor(c, r) / determinant), symmetric(&a)];
     }
-    let entry = |r: usize, c: usize| keep(r, c, minor(c, r) / determinant);
-    [
-        entry(0, 0),
-        entry(1, 1),
-        entry(2, 2),
-        entry(1, 2),
-        entry(0, 2),
-        entry(0, 1),
-    ]
+    // Three times the diagonal is above the block, whatever it is, and so keeps the bound of its eigenvalues.
+    let diagonal = |f: fn(f64) -> f64| {
+        symmetric(&|r, c| if r == c { f(a(c, c)) } else { 0.0 })
+    };
+    [diagonal(|v| (3.0 * v).recip()), diagonal(|v| 3.0 * v)]
 }
 
-/// Inverse blocks of the sites `start..start + held.len()`.
-pub fn chunk(operator: &impl Coarsen, start: usize, held: &[u8]) -> Vec<Symmetric> {
-    let mut row = Vec::with_capacity(32);
-    held.iter()
-        .enumerate()
-        .map(|(i, &held)| {
-            row.clear();
-            operator.row(start + i, &mut row);
-            let own = row.iter().find(|(j, _)| *j as usize == start + i);
-            own.map_or([0.0; 6], |(_, block)| inverse(block, held))
-        })
-        .collect()
+/// Calls `visit` with the pair of each site `start..start + held.len()`; zero without a row.
+fn each_pair(operator: &impl Coarsen, start: usize, held: &[u8], mut visit: impl FnMut(Pair)) {
+    operator.each_row(start..start + held.len(), &mut |site, columns, blocks| {
+        let own = columns.iter().position(|&j| j as usize == site);
+        visit(own.map_or([[0.0; 6]; 2], |k| pair(&blocks[k], held[site - start])));
+    });
+}
+
+/// The distinct pairs of a chunk and each site's place among them.
+fn distinct(operator: &impl Coarsen, start: usize, held: &[u8]) -> (Vec<Pair>, Vec<u16>) {
+    let mut known: HashMap<[u32; 6], u16> = HashMap::new();
+    let (mut kinds, mut of) = (Vec::new(), Vec::with_capacity(held.len()));
+    each_pair(operator, start, held, |pair| {
+        let kind = *known.entry(pair[0].map(f32::to_bits)).or_insert_with(|| {
+            kinds.push(pair);
+            kinds.len() as u16 - 1
+        });
+        of.push(kind);
+    });
+    (kinds, of)
 }
 
 #[cfg(test)]
@@ -111,17 +199,31 @@ mod tests {
     fn the_inverse_is_that_of_the_free_components() {
         let block = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.2], [0.5, -0.2, 5.0]];
         for held in 0..8 {
-            let d = Diagonal::from_chunks(vec![vec![inverse(&block, held)]]);
+            let d = Diagonal::few(vec![(vec![pair(&block, held)], vec![0])]).unwrap();
             for c in 0..3 {
                 // D⁻¹ applied to the free part of column c of the block.
                 let free = |k: usize| held & (1 << k) == 0;
                 let column = [0, 1, 2].map(|k| if free(k) { block[k][c] } else { 0.0 });
-                let back = d.times(0, &column);
+                let back = d.scale(0, &column);
                 for (k, &v) in back.iter().enumerate() {
                     let expected = if k == c && free(c) { 1.0 } else { 0.0 };
                     assert!(!free(c) || (v - expected).abs() < 1e-6);
                 }
+                let there = d.unscale(0, &d.scale(0, &column)).unwrap();
+                for (k, &v) in there.iter().enumerate() {
+                    assert!((v - column[k]).abs() < 1e-5);
+                }
             }
         }
+    }
+
+    /// `3 diag(B) >= B` for the block of a single bond, whose own inverse does not exist.
+    #[test]
+    fn a_block_without_inverse_is_replaced_by_one_above_it() {
+        let n = [0.6f32, 0.8, 0.0];
+        let [inverse, _] = pair(&n.map(|a| n.map(|b| a * b)), 0);
+        let z = times(&inverse, &n);
+        let quotient: f32 = n.iter().zip(&z).map(|(n, z)| n * z).sum();
+        assert!(quotient > 0.0 && quotient <= 1.0, "{quotient}");
     }
 }

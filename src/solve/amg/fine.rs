@@ -1,22 +1,22 @@
 //! Owns the finest level: the caller's operator, never assembled.
 
-use super::aggregate::Aggregates;
-use super::diagonal::{self, Diagonal};
+use super::aggregate::{Aggregates, CHUNK, Sums};
+use super::diagonal::Diagonal;
+use super::grouping;
 use super::level::{Level, Modes, NONE, Six};
 use super::rigid::{self, Basis, Mat6};
 use crate::operator::coarsen::{Block, Coarsen};
 use crate::operator::held::Held;
 use rayon::prelude::*;
-use std::cell::RefCell;
 use std::ops::Range;
 
 pub struct Fine<'a, O> {
     operator: &'a O,
-    /// Inverse diagonal blocks, zero in held components and at padding.
-    inverse: Diagonal,
-    pub aggregates: Aggregates,
-    /// Site relative to its aggregate's centre, in units of the aggregate's radius.
-    local: Vec<[f32; 3]>,
+    /// Zero in held components and at padding.
+    diagonal: Diagonal,
+    aggregates: Aggregates,
+    /// Each aggregate's centre and the inverse of its radius: motions are told in units of the radius.
+    frames: Vec<[f64; 4]>,
     /// Orthonormal motions of each aggregate from plain ones.
     bases: Vec<[Six; 6]>,
 }
@@ -32,45 +32,56 @@ pub struct Body {
 impl<'a, O: Coarsen> Fine<'a, O> {
     /// `box_mm`: edges of the boxes whose connected pieces are aggregates.
     pub fn new(operator: &'a O, held: &Held, box_mm: [f64; 3]) -> (Self, Vec<Body>) {
-        let inverse = inverse_diagonal(operator, held);
-        let positions: Vec<[f64; 3]> = (0..operator.sites())
-            .into_par_iter()
-            .map(|i| operator.position(i))
-            .collect();
-        let boxes = boxes(&positions, &inverse, box_mm);
-        let aggregates = Aggregates::in_boxes(&boxes, |i, list| {
-            ROW.with_borrow_mut(|row| {
-                row.clear();
-                operator.row(i, row);
-                list.clear();
-                list.extend(row.iter().map(|&(j, _)| j));
-            });
-        });
-        drop(boxes);
-        let bodies: Vec<Body> = (0..aggregates.count)
-            .into_par_iter()
-            .map(|a| body(aggregates.members(a), &positions, &inverse))
-            .collect();
-        let local = positions
-            .par_iter()
-            .zip(&aggregates.of)
-            .map(|(x, &a)| match bodies.get(a as usize) {
-                Some(b) => std::array::from_fn(|c| ((x[c] - b.center[c]) / b.radius) as f32),
-                None => [0.0; 3],
-            })
-            .collect();
-        let bases = bodies
+        let diagonal = Diagonal::new(operator, held);
+        let boxes = boxes(operator, &diagonal, box_mm);
+        let rows = |sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32])| {
+            operator.each_row(sites, &mut |site, columns, _| visit(site, columns));
+        };
+        let (of, count) = grouping::in_boxes(boxes, &rows);
+        let aggregates = Aggregates::new(&of, count);
+        drop(of);
+        let frames = frames(operator, &aggregates);
+        let mut fine = Fine {
+            operator,
+            diagonal,
+            aggregates,
+            frames,
+            bases: Vec::new(),
+        };
+        let bodies = fine.bodies();
+        fine.bases = bodies
             .iter()
             .map(|b| b.basis.basis.map(|row| row.map(|v| v as f32)))
             .collect();
-        let fine = Fine {
-            operator,
-            inverse,
-            aggregates,
-            local,
-            bases,
-        };
         (fine, bodies)
+    }
+
+    /// The aggregates as the next level sees them: their motions made orthonormal.
+    fn bodies(&self) -> Vec<Body> {
+        let count = self.aggregates.count;
+        let mut grams: Vec<(Mat6, f64)> = vec![([[0.0; 6]; 6], 0.0); count];
+        let visit = |sites: Range<usize>, sums: &mut Sums<(Mat6, f64)>| {
+            self.each_modes(sites, |site, modes| {
+                let Some((gram, sites)) = sums.of(site) else {
+                    return;
+                };
+                let rows = modes.map(|row| std::array::from_fn(|k| f64::from(row[k])));
+                rigid::add_gram(gram, &rows);
+                *sites += 1.0;
+            });
+        };
+        let add = |sum: &mut (Mat6, f64), part: &(Mat6, f64)| {
+            let both = sum.0.as_flattened_mut().iter_mut().zip(part.0.as_flattened());
+            both.for_each(|(s, p)| *s += p);
+            sum.1 += part.1;
+        };
+        self.aggregates.sum(&mut grams, ([[0.0; 6]; 6], 0.0), visit, add);
+        let body = |((gram, sites), [x, y, z, inverse]): (&(Mat6, f64), &[f64; 4])| Body {
+            center: [*x, *y, *z],
+            radius: inverse.recip(),
+            basis: rigid::orthonormalise(gram, *sites),
+        };
+        grams.par_iter().zip(&self.frames).map(body).collect()
     }
 
     /// Forces on plain motions to forces on orthonormal ones.
@@ -86,121 +97,151 @@ impl<'a, O: Coarsen> Fine<'a, O> {
             *raw = std::array::from_fn(|m| (0..6).map(|k| basis[m][k] * e[k]).sum());
         }
     }
+
+    /// Bytes beside the operator's.
+    pub fn bytes(&self) -> usize {
+        self.diagonal.bytes() + self.aggregates.bytes() + self.frames.len() * (32 + 144)
+    }
 }
 
-thread_local! {
-    /// Room for one row.
-    static ROW: RefCell<Vec<(u32, Block)>> = const { RefCell::new(Vec::new()) };
-}
-
-/// Sites per task of the set-up.
-const CHUNK: usize = 1 << 14;
-
-fn inverse_diagonal(operator: &impl Coarsen, held: &Held) -> Diagonal {
-    let chunks = held
-        .0
-        .par_chunks(CHUNK)
-        .enumerate()
-        .map(|(c, held)| diagonal::chunk(operator, c * CHUNK, held))
-        .collect();
-    Diagonal::from_chunks(chunks)
+/// Calls `visit` with every site of the range and its position in mm.
+fn each_position(
+    operator: &impl Coarsen,
+    sites: Range<usize>,
+    mut visit: impl FnMut(usize, &[f64; 3]),
+) {
+    let mut room = [[0.0; 3]; 512];
+    for start in sites.clone().step_by(room.len()) {
+        let part = start..(start + room.len()).min(sites.end);
+        let positions = &mut room[..part.len()];
+        operator.positions(part.clone(), positions);
+        part.zip(positions).for_each(|(site, x)| visit(site, x));
+    }
 }
 
 /// A number for every box that holds a free site.
-fn boxes(positions: &[[f64; 3]], inverse: &Diagonal, box_mm: [f64; 3]) -> Vec<u32> {
+fn boxes(operator: &impl Coarsen, diagonal: &Diagonal, box_mm: [f64; 3]) -> Vec<u32> {
     // Half a site's spacing at least off the boxes' walls on regular grids that begin at zero.
-    let index = |x: &[f64; 3]| x.map(|v| v.max(0.0));
     let cells = |x: &[f64; 3]| -> [u64; 3] {
-        let x = index(x);
-        std::array::from_fn(|a| (x[a] / box_mm[a] + 1e-6).floor() as u64)
+        std::array::from_fn(|a| (x[a].max(0.0) / box_mm[a] + 1e-6).floor() as u64)
     };
-    let most = positions.iter().map(cells).fold([0; 3], |m, c| {
-        [m[0].max(c[0]), m[1].max(c[1]), m[2].max(c[2])]
-    });
-    positions
-        .par_iter()
-        .enumerate()
-        .map(|(i, x)| {
-            let c = cells(x);
-            let number = (c[2] * (most[1] + 1) + c[1]) * (most[0] + 1) + c[0];
-            if inverse.free(i) == [0.0; 3] {
-                NONE
-            } else {
-                number as u32
-            }
+    let sites = diagonal.sites();
+    let chunk = |c: usize| c * CHUNK..((c + 1) * CHUNK).min(sites);
+    let most = (0..sites.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|c| {
+            let mut most = [0; 3];
+            each_position(operator, chunk(c), |_, x| {
+                let cell = cells(x);
+                most = std::array::from_fn(|a| cell[a].max(most[a]));
+            });
+            most
         })
-        .collect()
+        .reduce(|| [0; 3], |m, c| std::array::from_fn(|a| m[a].max(c[a])));
+    let mut boxes = vec![NONE; sites];
+    boxes.par_chunks_mut(CHUNK).enumerate().for_each(|(c, boxes)| {
+        each_position(operator, chunk(c), |site, x| {
+            if diagonal.free(site) != [0.0; 3] {
+                let at = cells(x);
+                let number = (at[2] * (most[1] + 1) + at[1]) * (most[0] + 1) + at[0];
+                boxes[site - c * CHUNK] = number as u32;
+            }
+        });
+    });
+    boxes
 }
 
-fn body(members: &[u32], positions: &[[f64; 3]], inverse: &Diagonal) -> Body {
-    let n = members.len() as f64;
-    let mut center = [0.0; 3];
-    for &i in members {
-        for c in 0..3 {
-            center[c] += positions[i as usize][c] / n;
-        }
-    }
-    let squared: f64 = members
-        .iter()
-        .map(|&i| {
-            (0..3)
-                .map(|c| (positions[i as usize][c] - center[c]).powi(2))
-                .sum::<f64>()
-        })
-        .sum();
-    let radius = if squared > 0.0 {
-        (squared / n).sqrt()
-    } else {
-        1.0
+/// Each aggregate's centre and the inverse of its radius (the root of its sites' mean squared distance).
+fn frames(operator: &impl Coarsen, aggregates: &Aggregates) -> Vec<[f64; 4]> {
+    let add = |sum: &mut [f64; 4], part: &[f64; 4]| {
+        sum.iter_mut().zip(part).for_each(|(s, p)| *s += p);
     };
-    let mut gram: Mat6 = [[0.0; 6]; 6];
-    for &i in members {
-        let i = i as usize;
-        let d = std::array::from_fn(|c| positions[i][c] - center[c]);
-        let carried = rigid::carry(d, radius, radius);
-        let free = inverse.free(i);
-        for c in (0..3).filter(|&c| free[c] > 0.0) {
-            rigid::add_gram(&mut gram, &carried[c..c + 1]);
-        }
+    let mut frames = vec![[0.0; 4]; aggregates.count];
+    let visit = |sites: Range<usize>, sums: &mut Sums<[f64; 4]>| {
+        each_position(operator, sites, |site, x| {
+            if let Some(sum) = sums.of(site) {
+                add(sum, &[x[0], x[1], x[2], 1.0]);
+            }
+        });
+    };
+    aggregates.sum(&mut frames, [0.0; 4], visit, add);
+    for [x, y, z, n] in &mut frames {
+        [x, y, z].into_iter().for_each(|c| *c /= *n);
     }
-    Body {
-        center,
-        radius,
-        basis: rigid::orthonormalise(&gram, n),
+    let mut squared = vec![[0.0; 2]; aggregates.count];
+    let visit = |sites: Range<usize>, sums: &mut Sums<[f64; 2]>| {
+        each_position(operator, sites, |site, x| {
+            if let Some(sum) = sums.of(site) {
+                let center = &frames[aggregates.of(site) as usize];
+                sum[0] += (0..3).map(|c| (x[c] - center[c]).powi(2)).sum::<f64>();
+                sum[1] += 1.0;
+            }
+        });
+    };
+    aggregates.sum(&mut squared, [0.0; 2], visit, |s, p| {
+        (s[0], s[1]) = (s[0] + p[0], s[1] + p[1]);
+    });
+    for (frame, [sum, n]) in frames.iter_mut().zip(squared) {
+        frame[3] = if sum > 0.0 { (n / sum).sqrt() } else { 1.0 };
     }
+    frames
 }
 
 impl<O: Coarsen> Level<3> for Fine<'_, O> {
     fn sites(&self) -> usize {
-        self.inverse.sites()
+        self.diagonal.sites()
     }
 
     fn rows(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
         self.operator.rows_f32(sites, x, y);
     }
 
-    fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>) {
-        self.operator.row(site, blocks);
+    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
+        self.operator.each_row(sites, visit);
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        self.operator.reach(sites)
     }
 
     #[inline]
     fn scale(&self, site: usize, r: &[f32; 3]) -> [f32; 3] {
-        self.inverse.times(site, r)
+        self.diagonal.scale(site, r)
     }
 
     #[inline]
-    fn aggregate(&self, site: usize) -> u32 {
-        self.aggregates.of[site]
+    fn unscale(&self, site: usize, t: &[f32; 3]) -> Option<[f32; 3]> {
+        self.diagonal.unscale(site, t)
+    }
+
+    fn stiffness(&self, site: usize) -> f32 {
+        self.diagonal.stiffness(site)
+    }
+
+    fn aggregates(&self) -> &Aggregates {
+        &self.aggregates
     }
 
     #[inline]
-    fn modes(&self, site: usize) -> Modes<3> {
-        let [x, y, z] = self.local[site];
-        let free = self.inverse.free(site);
-        [
-            [free[0], 0.0, 0.0, 0.0, free[0] * z, -free[0] * y, 0.0, 0.0],
-            [0.0, free[1], 0.0, -free[1] * z, 0.0, free[1] * x, 0.0, 0.0],
-            [0.0, 0.0, free[2], free[2] * y, -free[2] * x, 0.0, 0.0, 0.0],
-        ]
+    fn each_modes(&self, sites: Range<usize>, mut visit: impl FnMut(usize, Modes<3>)) {
+        each_position(self.operator, sites, |site, x| {
+            let aggregate = self.aggregates.of(site);
+            if aggregate == NONE {
+                return visit(site, [[0.0; 8]; 3]);
+            }
+            let frame = &self.frames[aggregate as usize];
+            let [x, y, z] = [0, 1, 2].map(|c| ((x[c] - frame[c]) * frame[3]) as f32);
+            let f = self.diagonal.free(site);
+            let modes = [
+                [f[0], 0.0, 0.0, 0.0, f[0] * z, -f[0] * y, 0.0, 0.0],
+                [0.0, f[1], 0.0, -f[1] * z, 0.0, f[1] * x, 0.0, 0.0],
+                [0.0, 0.0, f[2], f[2] * y, -f[2] * x, 0.0, 0.0, 0.0],
+            ];
+            visit(site, modes);
+        });
+    }
+
+    fn eigenvalue_bound(&self) -> f32 {
+        self.operator.eigenvalue_bound() as f32
     }
 }

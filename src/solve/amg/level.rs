@@ -1,5 +1,6 @@
 //! Owns what the cycle, the smoother and the Galerkin product know of one level.
 
+use super::aggregate::Aggregates;
 use std::ops::Range;
 
 /// No aggregate: padding, or a site with nothing free.
@@ -16,12 +17,24 @@ pub trait Level<const D: usize>: Sync {
     fn sites(&self) -> usize;
     /// Rows of `A x`, as [`crate::operator::coarsen::Coarsen::rows_f32`].
     fn rows(&self, sites: Range<usize>, x: &[[f32; D]], y: &mut [[f32; D]]);
-    /// Appends the blocks of one row.
-    fn row(&self, site: usize, blocks: &mut Vec<(u32, [[f32; D]; D])>);
+    /// Calls `visit` with every site of the range, in order, and the columns and blocks of its row.
+    fn each_row(
+        &self,
+        sites: Range<usize>,
+        visit: &mut dyn FnMut(usize, &[u32], &[[[f32; D]; D]]),
+    );
+    /// A range that holds every column of these rows.
+    fn reach(&self, sites: Range<usize>) -> Range<usize>;
     /// `D⁻¹ r` at a site, zero in held components.
     fn scale(&self, site: usize, r: &[f32; D]) -> [f32; D];
-    /// The aggregate of a site, or [`NONE`].
-    fn aggregate(&self, site: usize) -> u32;
-    /// The motions of a site's aggregate, zero in held components.
-    fn modes(&self, site: usize) -> Modes<D>;
+    /// `D t` at a site on its free components, where [`Level::scale`] has an exact inverse.
+    fn unscale(&self, site: usize, t: &[f32; D]) -> Option<[f32; D]>;
+    /// The mean of the diagonal of `D` at a site.
+    fn stiffness(&self, site: usize) -> f32;
+    fn aggregates(&self) -> &Aggregates;
+    /// Calls `visit` with every site of the range, in order, and the motions of its aggregate there, zero in held
+    /// components and for sites without one.
+    fn each_modes(&self, sites: Range<usize>, visit: impl FnMut(usize, Modes<D>));
+    /// A bound of the largest eigenvalue of `D⁻¹A`, or a good guess with a margin.
+    fn eigenvalue_bound(&self) -> f32;
 }

@@ -15,20 +15,23 @@ mod coarse;
 mod coarsest;
 mod cycle;
 mod diagonal;
+mod eigenvalue;
 mod fine;
 mod galerkin;
+mod grouping;
 mod level;
 mod rigid;
+mod window;
 
-use crate::operator::Preconditioner;
+use crate::operator::{Preconditioner, SinglePreconditioner};
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
-use chebyshev::{Chebyshev, largest_eigenvalue};
-use coarse::Coarse;
+use chebyshev::Chebyshev;
+use coarse::{Coarse, gross};
 use coarsest::Coarsest;
 use cycle::{Smoothing, Vectors, cycle};
 use fine::Fine;
-use level::{Level, Six};
+use level::Level;
 use rayon::prelude::*;
 use std::sync::Mutex;
 
@@ -73,27 +76,24 @@ pub struct Amg<'a, O> {
     how: Smoothing,
     coarse: Vec<(Coarse, Smoothing)>,
     coarsest: Coarsest,
-    /// Made once, used by one cycle at a time.
-    room: Mutex<Room>,
-}
-
-struct Room {
-    fine: Vectors<3>,
-    /// One for every assembled level, the coarsest among them.
-    coarse: Vec<Vectors<6>>,
+    /// Made once, used by one cycle at a time: one for every assembled level, the coarsest among them.
+    room: Mutex<Vec<Vectors>>,
+    /// Right-hand side, solution and one more for double-precision callers, made by the first call.
+    doubles: Mutex<[Vec<[f32; 3]>; 3]>,
 }
 
 impl<'a, O: Coarsen> Amg<'a, O> {
     pub fn new(operator: &'a O, held: &Held, params: &AmgParams) -> Self {
         let (fine, mut bodies) = Fine::new(operator, held, params.box_mm);
         let how = smoothing(&fine, params.degrees[0]);
-        let count = fine.aggregates.count;
-        let mut matrix = galerkin::product(&fine, how.omega, count, Some(&bodies));
+        let mut matrix = galerkin::product(&fine, how.omega, Some(&bodies));
+        let mut below = gross(&fine);
         let mut coarse: Vec<(Coarse, Smoothing)> = Vec::new();
         while matrix.rows() > params.coarsest {
-            let (level, next) = Coarse::new(matrix, &bodies);
+            let (level, next) = Coarse::new(matrix, &bodies, &below);
+            below = gross(&level);
             let how = smoothing(&level, params.degrees[1]);
-            matrix = galerkin::product(&level, how.omega, next.len(), None);
+            matrix = galerkin::product(&level, how.omega, None);
             let stuck = 10 * next.len() > 9 * level.sites();
             bodies = next;
             coarse.push((level, how));
@@ -101,63 +101,82 @@ impl<'a, O: Coarsen> Amg<'a, O> {
                 break;
             }
         }
-        let mut rooms: Vec<Vectors<6>> = coarse
+        let mut rooms: Vec<Vectors> = coarse
             .iter()
             .map(|(l, _)| Vectors::new(l.sites()))
             .collect();
         rooms.push(Vectors::new(matrix.rows()));
-        let room = Room {
-            fine: Vectors::new(fine.sites()),
-            coarse: rooms,
-        };
         Amg {
             fine,
             how,
             coarse,
-            coarsest: Coarsest::new(&matrix),
-            room: Mutex::new(room),
+            coarsest: Coarsest::new(&matrix, &below),
+            room: Mutex::new(rooms),
+            doubles: Mutex::default(),
         }
     }
 
     /// Sites of each level, finest first.
     pub fn levels(&self) -> Vec<usize> {
-        let fine = [
-            self.fine.aggregates.members.len(),
-            self.fine.aggregates.count,
-        ];
-        let coarse = self.coarse.iter().map(|(l, _)| l.aggregates.count);
+        let aggregates = self.fine.aggregates();
+        let fine = [aggregates.sites(), aggregates.count];
+        let coarse = self.coarse.iter().map(|(l, _)| l.aggregates().count);
         fine.into_iter().chain(coarse).collect()
     }
 
-    /// Bytes of the assembled levels.
-    pub fn coarse_bytes(&self) -> usize {
-        self.coarse.iter().map(|(l, _)| l.bytes()).sum()
+    /// Bytes kept, without the operator's and without the vectors of the finest level: what belongs to that level, and
+    /// the assembled ones.
+    pub fn bytes(&self) -> [usize; 2] {
+        let coarse = self.coarse.iter().map(|(l, _)| l.bytes() + 72 * l.sites());
+        [self.fine.bytes(), coarse.sum()]
     }
 
-    fn coarse_cycle(&self, depth: usize, rooms: &mut [Vectors<6>]) {
+    fn coarse_cycle(&self, depth: usize, rooms: &mut [Vectors]) {
         let (here, below) = rooms.split_at_mut(1);
-        let here = &mut here[0];
+        let Vectors { b, x, spare } = &mut here[0];
         match self.coarse.get(depth) {
-            None => self.coarsest.solve(&here.b, &mut here.x),
-            Some((level, how)) => cycle(level, &level.aggregates, how, here, |collect, prolong| {
+            None => self.coarsest.solve(b, x),
+            Some((level, how)) => cycle(level, how, b, x, spare, move |collect| {
                 collect(&mut below[0].b);
                 self.coarse_cycle(depth + 1, below);
-                prolong(&below[0].x);
+                &below[0].x
             }),
         }
     }
 }
 
-/// A margin over the eigenvalue that power iteration found from below.
-const MARGIN: f32 = 1.1;
+/// What the smoother leaves of the bound of the eigenvalues: polynomials of degree 2 still damp, if weakly, what lies up
+/// to 1.12 times above their interval, and most eigenvalues lie far below a bound.
+const SHRINK: f32 = 1.0 / 1.1;
 
 fn smoothing<const D: usize>(level: &impl Level<D>, degree: usize) -> Smoothing {
-    let largest = (MARGIN * largest_eigenvalue(level)).max(f32::MIN_POSITIVE);
+    let largest = (SHRINK * level.eigenvalue_bound()).max(f32::MIN_POSITIVE);
     // What a polynomial of this degree damps well: its interval begins at about 1 / (2 degree)².
     let range = [4.0, 8.0, 16.0, 25.0][degree.clamp(1, 4) - 1];
     Smoothing {
         smoother: Chebyshev::new(largest, range, degree),
         omega: 4.0 / 3.0 / largest,
+    }
+}
+
+impl<O: Coarsen> SinglePreconditioner<3> for Amg<'_, O> {
+    fn apply_single(&self, r: &[[f32; 3]], z: &mut Vec<[f32; 3]>, spare: &mut Vec<[f32; 3]>) {
+        let mut room = self.room.lock().unwrap_or_else(|e| e.into_inner());
+        if self.fine.aggregates().count == 0 {
+            z.fill([0.0; 3]);
+            return;
+        }
+        let (room, plain) = (
+            &mut *room,
+            &mut vec![[0.0; 6]; self.fine.aggregates().count][..],
+        );
+        cycle(&self.fine, &self.how, r, z, spare, move |collect| {
+            collect(plain);
+            self.fine.to_basis(plain, &mut room[0].b);
+            self.coarse_cycle(0, room);
+            self.fine.to_plain(&room[0].x, plain);
+            plain
+        });
     }
 }
 
@@ -171,33 +190,16 @@ impl<O: Coarsen> Preconditioner<3> for Amg<'_, O> {
             z.par_iter_mut().for_each(|z| *z = [0.0; 3]);
             return;
         }
-        if self.fine.aggregates.count == 0 {
-            z.par_iter_mut().for_each(|z| *z = [0.0; 3]);
-            return;
-        }
-        let mut room = self.room.lock().unwrap_or_else(|e| e.into_inner());
-        let Room { fine, coarse } = &mut *room;
+        let mut doubles = self.doubles.lock().unwrap_or_else(|e| e.into_inner());
+        doubles.iter_mut().for_each(|v| v.resize(r.len(), [0.0; 3]));
+        let [b, x, spare] = &mut *doubles;
         let shrink = largest.recip();
-        fine.b
-            .par_iter_mut()
+        b.par_iter_mut()
             .zip(r)
             .for_each(|(b, r)| *b = r.map(|v| (v * shrink) as f32));
-        cycle(
-            &self.fine,
-            &self.fine.aggregates,
-            &self.how,
-            fine,
-            |collect, prolong| {
-                let mut raw: Vec<Six> = vec![[0.0; 6]; coarse[0].b.len()];
-                collect(&mut raw);
-                self.fine.to_basis(&raw, &mut coarse[0].b);
-                self.coarse_cycle(0, coarse);
-                self.fine.to_plain(&coarse[0].x, &mut raw);
-                prolong(&raw);
-            },
-        );
+        self.apply_single(b, x, spare);
         z.par_iter_mut()
-            .zip(&fine.x)
+            .zip(x)
             .for_each(|(z, x)| *z = x.map(|v| f64::from(v) * largest));
     }
 }

@@ -1,9 +1,11 @@
 //! Owns what to do when a strong preconditioner is found not to be positive: carry on with the diagonal one.
 
+use crate::operator::coarsen::Coarsen;
 use crate::operator::held::{Constrained, Held};
-use crate::operator::{Operator, Preconditioner};
+use crate::operator::{Operator, Preconditioner, SinglePreconditioner};
 use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, minimise};
 use crate::solve::jacobi::Jacobi;
+use crate::solve::mixed;
 
 /// [`minimise`] with `preconditioner`; should that break down, from where it came to with the diagonal. Iterations are
 /// those of both.
@@ -19,6 +21,33 @@ pub fn minimise_or_fall_back<const D: usize>(
     if first.ended != Ended::Breakdown {
         return first;
     }
+    carry_on(&first, operator, held, u, params, observe)
+}
+
+/// The same by [`mixed`], before it falls back.
+pub fn minimise_mixed_or_fall_back(
+    operator: &impl Coarsen,
+    held: &Held,
+    preconditioner: &impl SinglePreconditioner<3>,
+    u: &mut [[f64; 3]],
+    params: &CgParams,
+    mut observe: impl FnMut(CgStep),
+) -> CgInfo {
+    let first = mixed::minimise(operator, held, preconditioner, u, params, &mut observe);
+    if first.ended != Ended::Breakdown {
+        return first;
+    }
+    carry_on(&first, operator, held, u, params, observe)
+}
+
+fn carry_on<const D: usize>(
+    first: &CgInfo,
+    operator: &impl Operator<D>,
+    held: &Held,
+    u: &mut [[f64; D]],
+    params: &CgParams,
+    mut observe: impl FnMut(CgStep),
+) -> CgInfo {
     let diagonal = Jacobi::new(&Constrained {
         inner: operator,
         held,

@@ -224,3 +224,88 @@ fn advance(
         .collect();
     parts.iter().sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::operator::Operator;
+    use crate::operator::coarsen::Block;
+    use std::ops::Range;
+
+    /// A chain of springs along x, held across.
+    struct Chain(usize);
+
+    impl Operator<3> for Chain {
+        fn sites(&self) -> usize {
+            self.0
+        }
+        fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+            self.rows_f64(0..self.0, x, y);
+        }
+        fn diagonal(&self, d: &mut [[f64; 3]]) {
+            d.fill([2.0; 3]);
+        }
+    }
+
+    impl Coarsen for Chain {
+        fn positions(&self, _: Range<usize>, _: &mut [[f64; 3]]) {}
+        fn each_row(&self, _: Range<usize>, _: &mut dyn FnMut(usize, &[u32], &[Block])) {}
+        fn reach(&self, sites: Range<usize>) -> Range<usize> {
+            sites
+        }
+        fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+            for (i, y) in sites.zip(y) {
+                let [left, right] = [i.saturating_sub(1), (i + 1).min(self.0 - 1)].map(|j| x[j][0]);
+                *y = [2.0 * x[i][0] - left - right, 0.0, 0.0];
+            }
+        }
+        fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
+            for (i, y) in sites.zip(y) {
+                let [left, right] = [i.saturating_sub(1), (i + 1).min(self.0 - 1)].map(|j| x[j][0]);
+                *y = [2.0 * x[i][0] - left - right, 0.0, 0.0];
+            }
+        }
+        fn eigenvalue_bound(&self) -> f64 {
+            2.0
+        }
+    }
+
+    struct Plain;
+
+    impl SinglePreconditioner<3> for Plain {
+        fn apply_single(&self, r: &[[f32; 3]], z: &mut Vec<[f32; 3]>, _: &mut Vec<[f32; 3]>) {
+            z.copy_from_slice(r);
+        }
+    }
+
+    /// The stretch of a chain to ten digits more than single precision has, by making the residual anew.
+    #[test]
+    fn single_precision_vectors_do_not_limit_the_result() {
+        let n = 120;
+        let mut held = Held::none(n);
+        for i in 0..n {
+            held.hold(i, 1);
+            held.hold(i, 2);
+        }
+        held.hold(0, 0);
+        held.hold(n - 1, 0);
+        let mut u = vec![[0.0; 3]; n];
+        u[n - 1][0] = 1.0;
+        let params = CgParams {
+            energy_tolerance: 0.0,
+            ..CgParams::default()
+        };
+        let info = minimise(&Chain(n), &held, &Plain, &mut u, &params, |_| ());
+        assert!(
+            info.ended == Ended::ResidualTolerance && info.residual < 1e-11,
+            "{info:?}"
+        );
+        assert!(
+            (info.energy * (n - 1) as f64 - 1.0).abs() < 1e-12,
+            "{info:?}"
+        );
+        for (i, u) in u.iter().enumerate() {
+            assert!((u[0] - i as f64 / (n - 1) as f64).abs() < 1e-10, "{i}");
+        }
+    }
+}

@@ -8,5 +8,6 @@ pub mod estimate;
 pub mod fallback;
 pub mod jacobi;
 pub mod lanczos;
+pub mod mixed;
 pub mod newton;
 pub mod zone;

@@ -183,6 +183,12 @@ impl VoxelMesh {
         [s.at[0] + node as u32 - s.start, s.at[1], s.at[2]]
     }
 
+    /// Position of a node in mm.
+    pub fn position(&self, node: usize) -> [f64; 3] {
+        let at = self.indices(node);
+        std::array::from_fn(|a| f64::from(at[a]) * self.grid.spacing_mm[a])
+    }
+
     /// The element of which each node is the corner of smallest x, y, z, in the order of the nodes, as indices into
     /// the grid; None where that element does not exist.
     pub fn low_corner_elements(&self) -> impl Iterator<Item = Option<usize>> + '_ {

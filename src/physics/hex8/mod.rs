@@ -80,9 +80,11 @@ impl Coarsen for Hex8 {
             for (i, node) in (0u32..).zip(segment.nodes()) {
                 let (places, blocks) = self.couplings.of(self.mesh.around[node]);
                 columns.clear();
-                columns.extend(places.iter().map(|p| {
-                    segment.rows[p.row as usize] + i + u32::from(p.dx) - 1
-                }));
+                columns.extend(
+                    places
+                        .iter()
+                        .map(|p| segment.rows[p.row as usize] + i + u32::from(p.dx) - 1),
+                );
                 visit(node, &columns, blocks);
             }
         }

@@ -107,8 +107,7 @@ impl Coarsen for Springs<'_> {
 
     fn reach(&self, sites: Range<usize>) -> Range<usize> {
         let mut reach = sites.clone();
-        for (site, p) in sites.flat_map(|s| (0..self.lattice.pairs.len()).map(move |p| (s, p))) {
-            let (plus, minus) = self.lattice.ends(site, p);
+        for (_, plus, minus) in sites.flat_map(|site| self.lattice.bonded(site)) {
             reach.start = reach.start.min(plus).min(minus);
             reach.end = reach.end.max(plus + 1).max(minus + 1);
         }

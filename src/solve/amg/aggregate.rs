@@ -151,7 +151,13 @@ mod tests {
     #[test]
     fn sums_are_those_of_each_aggregates_sites() {
         let of: Vec<u32> = (0..3 * CHUNK as u32 + 17)
-            .map(|i| if i % 11 == 3 { NONE } else { i * 7 % 5003 % 900 })
+            .map(|i| {
+                if i % 11 == 3 {
+                    NONE
+                } else {
+                    i * 7 % 5003 % 900
+                }
+            })
             .collect();
         let all = Aggregates::new(&of, 900);
         let mut expected = vec![0u64; 900];

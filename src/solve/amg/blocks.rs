@@ -116,7 +116,12 @@ impl BlockMatrix {
     /// # Safety
     /// The instruction set of `L` is there.
     #[inline(always)]
-    unsafe fn multiply_lanes<L: Lanes<S = f32>>(&self, rows: Range<usize>, x: &[Six], y: &mut [Six]) {
+    unsafe fn multiply_lanes<L: Lanes<S = f32>>(
+        &self,
+        rows: Range<usize>,
+        x: &[Six],
+        y: &mut [Six],
+    ) {
         for (i, y) in rows.zip(y) {
             let mut wide = [0f32; 8];
             // SAFETY: a block's last load runs two scalars over, into the next block or the one kept after the last.
@@ -162,13 +167,19 @@ mod tests {
         let block = |p: (u32, u32)| -> Block6 {
             std::array::from_fn(|i| {
                 let (r, c) = (i % 6, i / 6);
-                let (r, c) = if p.0 == p.1 { (r.min(c), r.max(c)) } else { (r, c) };
+                let (r, c) = if p.0 == p.1 {
+                    (r.min(c), r.max(c))
+                } else {
+                    (r, c)
+                };
                 ((13 * p.0 + 7 * p.1) as f32 + (3 * r + 5 * c) as f32).sin()
             })
         };
         let m = BlockMatrix::from_upper(&places, places.iter().map(|&p| block(p)).collect());
         assert_eq!(m.rows(), 4);
-        let x: Vec<Six> = (0..4).map(|i| std::array::from_fn(|c| (i * 6 + c) as f32 * 0.3 - 2.0)).collect();
+        let x: Vec<Six> = (0..4)
+            .map(|i| std::array::from_fn(|c| (i * 6 + c) as f32 * 0.3 - 2.0))
+            .collect();
         let mut expected = vec![[0.0; 6]; 4];
         for &p in &places {
             let b = block(p);

@@ -120,7 +120,9 @@ pub fn gross<const D: usize>(level: &impl Level<D>) -> Vec<f32> {
     level.aggregates().sum(&mut sums, [0.0; 2], visit, |s, p| {
         *s = [s[0] + p[0], s[1] + p[1]];
     });
-    sums.iter().map(|[stiffness, sites]| stiffness / sites).collect()
+    sums.iter()
+        .map(|[stiffness, sites]| stiffness / sites)
+        .collect()
 }
 
 /// Share of the gross stiffness below which a motion's own is rounding: it is a mechanism, or held.
@@ -162,7 +164,11 @@ impl Level<6> for Coarse {
             squares.clear();
             for (j, block, transposed) in self.matrix.row(site) {
                 // Stored by columns: by rows, what is stored is the transposed block.
-                let by_rows = if transposed { *block } else { blocks::mirrored(block) };
+                let by_rows = if transposed {
+                    *block
+                } else {
+                    blocks::mirrored(block)
+                };
                 let row = |r: usize| std::array::from_fn(|c| by_rows[6 * r + c]);
                 columns.push(j);
                 squares.push(std::array::from_fn(row));
@@ -173,7 +179,9 @@ impl Level<6> for Coarse {
 
     fn reach(&self, sites: Range<usize>) -> Range<usize> {
         let columns = sites.clone().flat_map(|i| self.matrix.row(i));
-        columns.fold(sites, |r, (j, ..)| r.start.min(j as usize)..r.end.max(j as usize + 1))
+        columns.fold(sites, |r, (j, ..)| {
+            r.start.min(j as usize)..r.end.max(j as usize + 1)
+        })
     }
 
     #[inline]

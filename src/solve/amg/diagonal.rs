@@ -13,10 +13,7 @@ pub type Pair = [Symmetric; 2];
 
 pub enum Diagonal {
     /// The distinct blocks, inverse and not, and each site's.
-    Few {
-        kinds: Vec<Pair>,
-        of: Vec<u16>,
-    },
+    Few { kinds: Vec<Pair>, of: Vec<u16> },
     /// An inverse block a site.
     Each(Vec<Symmetric>),
 }
@@ -33,12 +30,14 @@ impl Diagonal {
             .collect();
         Diagonal::few(few).unwrap_or_else(|| {
             let mut all = vec![[0.0; 6]; held.0.len()];
-            all.par_chunks_mut(CHUNK).zip(chunks).for_each(|(all, (c, held))| {
-                let mut all = all.iter_mut();
-                each_pair(operator, c * CHUNK, held, |[inverse, _]| {
-                    all.next().into_iter().for_each(|a| *a = inverse);
+            all.par_chunks_mut(CHUNK)
+                .zip(chunks)
+                .for_each(|(all, (c, held))| {
+                    let mut all = all.iter_mut();
+                    each_pair(operator, c * CHUNK, held, |[inverse, _]| {
+                        all.next().into_iter().for_each(|a| *a = inverse);
+                    });
                 });
-            });
             Diagonal::Each(all)
         })
     }
@@ -156,16 +155,18 @@ fn pair(block: &Block, held: u8) -> Pair {
     let condition = trace(&|c| a(c, c)) * trace(&|c| minor(c, c) / determinant);
     let symmetric = |f: &dyn Fn(usize, usize) -> f64| {
         [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)].map(|(r, c)| {
-            if free[r] && free[c] { f(r, c) as f32 } else { 0.0 }
+            if free[r] && free[c] {
+                f(r, c) as f32
+            } else {
+                0.0
+            }
         })
     };
     if determinant > 0.0 && condition < MOST_CONDITION {
         return [symmetric(&|r, c| minor(c, r) / determinant), symmetric(&a)];
     }
     // Three times the diagonal is above the block, whatever it is, and so keeps the bound of its eigenvalues.
-    let diagonal = |f: fn(f64) -> f64| {
-        symmetric(&|r, c| if r == c { f(a(c, c)) } else { 0.0 })
-    };
+    let diagonal = |f: fn(f64) -> f64| symmetric(&|r, c| if r == c { f(a(c, c)) } else { 0.0 });
     [diagonal(|v| (3.0 * v).recip()), diagonal(|v| 3.0 * v)]
 }
 

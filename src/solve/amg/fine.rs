@@ -71,11 +71,16 @@ impl<'a, O: Coarsen> Fine<'a, O> {
             });
         };
         let add = |sum: &mut (Mat6, f64), part: &(Mat6, f64)| {
-            let both = sum.0.as_flattened_mut().iter_mut().zip(part.0.as_flattened());
+            let both = sum
+                .0
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(part.0.as_flattened());
             both.for_each(|(s, p)| *s += p);
             sum.1 += part.1;
         };
-        self.aggregates.sum(&mut grams, ([[0.0; 6]; 6], 0.0), visit, add);
+        self.aggregates
+            .sum(&mut grams, ([[0.0; 6]; 6], 0.0), visit, add);
         let body = |((gram, sites), [x, y, z, inverse]): (&(Mat6, f64), &[f64; 4])| Body {
             center: [*x, *y, *z],
             radius: inverse.recip(),
@@ -139,15 +144,18 @@ fn boxes(operator: &impl Coarsen, diagonal: &Diagonal, box_mm: [f64; 3]) -> Vec<
         })
         .reduce(|| [0; 3], |m, c| std::array::from_fn(|a| m[a].max(c[a])));
     let mut boxes = vec![NONE; sites];
-    boxes.par_chunks_mut(CHUNK).enumerate().for_each(|(c, boxes)| {
-        each_position(operator, chunk(c), |site, x| {
-            if diagonal.free(site) != [0.0; 3] {
-                let at = cells(x);
-                let number = (at[2] * (most[1] + 1) + at[1]) * (most[0] + 1) + at[0];
-                boxes[site - c * CHUNK] = number as u32;
-            }
+    boxes
+        .par_chunks_mut(CHUNK)
+        .enumerate()
+        .for_each(|(c, boxes)| {
+            each_position(operator, chunk(c), |site, x| {
+                if diagonal.free(site) != [0.0; 3] {
+                    let at = cells(x);
+                    let number = (at[2] * (most[1] + 1) + at[1]) * (most[0] + 1) + at[0];
+                    boxes[site - c * CHUNK] = number as u32;
+                }
+            });
         });
-    });
     boxes
 }
 

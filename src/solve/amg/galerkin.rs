@@ -186,7 +186,8 @@ impl Sum {
 
 /// Adds up the parts in their order, changes the basis and makes the diagonal blocks even.
 fn merge(parts: Vec<Part>, bodies: Option<&[Body]>) -> BlockMatrix {
-    let mut index: Vec<(u32, u32, u32, u32)> = Vec::with_capacity(parts.iter().map(|p| p.places.len()).sum());
+    let mut index: Vec<(u32, u32, u32, u32)> =
+        Vec::with_capacity(parts.iter().map(|p| p.places.len()).sum());
     for (p, part) in parts.iter().enumerate() {
         let places = part.places.iter().enumerate();
         index.extend(places.map(|(k, &(row, column))| (row, column, p as u32, k as u32)));

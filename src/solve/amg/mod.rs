@@ -23,9 +23,9 @@ mod level;
 mod rigid;
 mod window;
 
-use crate::operator::{Preconditioner, SinglePreconditioner};
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
+use crate::operator::{Preconditioner, SinglePreconditioner};
 use chebyshev::Chebyshev;
 use coarse::{Coarse, gross};
 use coarsest::Coarsest;

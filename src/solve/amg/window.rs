@@ -138,7 +138,9 @@ impl<'l, const D: usize, L: Level<D>> Prolongator<'l, L, D> {
             for (k, i) in span(b).enumerate() {
                 let (row, modes) = (self.read.row(k), &self.modes);
                 // SAFETY: the caller's.
-                unsafe { append_row::<N, L, D>(self.level, self.omega, modes, i, row, &mut entries) };
+                unsafe {
+                    append_row::<N, L, D>(self.level, self.omega, modes, i, row, &mut entries)
+                };
                 starts.push(entries.len() as u32);
             }
             self.rows.blocks.push_back((starts, entries));

@@ -103,14 +103,28 @@ impl Operator<3> for Bricks {
 }
 
 impl Coarsen for Bricks {
-    fn position(&self, site: usize) -> [f64; 3] {
-        self.mesh().position(site)
+    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.positions(sites, x),
+            Bricks::Graded(model) => model.positions(sites, x),
+        }
     }
 
-    fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>) {
+    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
         match self {
-            Bricks::Equal(model) => model.row(site, blocks),
-            Bricks::Graded(model) => model.row(site, blocks),
+            Bricks::Equal(model) => model.each_row(sites, visit),
+            Bricks::Graded(model) => model.each_row(sites, visit),
+        }
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        self.mesh().reach(sites)
+    }
+
+    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.rows_f64(sites, x, y),
+            Bricks::Graded(model) => model.rows_f64(sites, x, y),
         }
     }
 
@@ -118,6 +132,13 @@ impl Coarsen for Bricks {
         match self {
             Bricks::Equal(model) => model.rows_f32(sites, x, y),
             Bricks::Graded(model) => model.rows_f32(sites, x, y),
+        }
+    }
+
+    fn eigenvalue_bound(&self) -> f64 {
+        match self {
+            Bricks::Equal(model) => model.eigenvalue_bound(),
+            Bricks::Graded(model) => model.eigenvalue_bound(),
         }
     }
 }

@@ -4,15 +4,14 @@ use crate::error::{Error, Result};
 use crate::measure::apparent::Loaded;
 use crate::measure::row::Row;
 use crate::operator::Operator;
-use crate::operator::held::{Constrained, Held};
+use crate::operator::held::Held;
 use crate::par::sum_chunks;
 use crate::physics::lattice::multigrid::Springs;
 use crate::physics::lattice::{self, Lattice};
 use crate::solve::amg::{Amg, AmgParams};
-use crate::solve::cg::{CgInfo, CgParams, CgStep, minimise};
+use crate::solve::cg::{CgInfo, CgParams, CgStep};
 use crate::solve::fallback::minimise_or_fall_back;
-use crate::solve::jacobi::Jacobi;
-use crate::stage::lattice::{Boundary, Case, Structure, build};
+use crate::stage::lattice::{Boundary, Case, build};
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::{Ends, Load, SolveParams};
 use crate::topology::sites::Sites;
@@ -59,18 +58,9 @@ pub fn solve_lattice(
         max_iterations: params.max_iterations,
         ..CgParams::default()
     };
-    // Multigrid diverges on some BCC lattices (seen at LP 0.12 mm on a real stack), so only SC has it.
-    let info = if case.structure == Structure::Sc {
-        let springs = Springs::new(&model);
-        let amg = Amg::new(&springs, &held, &AmgParams::lattice(case.lp_mm));
-        minimise_or_fall_back(&model, &held, &amg, &mut u, &cg, observe)
-    } else {
-        let diagonal = Jacobi::new(&Constrained {
-            inner: &model,
-            held: &held,
-        });
-        minimise(&model, &held, &diagonal, &mut u, &cg, observe)
-    };
+    let springs = Springs::new(&model);
+    let amg = Amg::new(&springs, &held, &AmgParams::lattice(case.lp_mm));
+    let info = minimise_or_fall_back(&model, &held, &amg, &mut u, &cg, observe);
     Ok(Solved {
         sites: sites.len(),
         dropped: sites.dropped,

@@ -8,7 +8,7 @@ use crate::operator::held::Held;
 use crate::par::sum_chunks;
 use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
-use crate::solve::fallback::minimise_or_fall_back;
+use crate::solve::fallback::minimise_mixed_or_fall_back;
 use crate::stage::solve::bricks::{Bricks, Keep};
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::{Ends, Load, SolveParams};
@@ -52,7 +52,7 @@ pub fn solve_voxels(
         ..CgParams::default()
     };
     let preconditioner = Amg::new(&model, &held, &AmgParams::new(mesh.grid.spacing_mm));
-    let info = minimise_or_fall_back(&model, &held, &preconditioner, &mut u, &cg, observe);
+    let info = minimise_mixed_or_fall_back(&model, &held, &preconditioner, &mut u, &cg, observe);
     drop(preconditioner);
     Ok(Solved {
         sites: mesh.elements,

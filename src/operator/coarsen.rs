@@ -7,6 +7,9 @@ use std::ops::Range;
 /// component `b` of the column's site.
 pub type Block = [[f32; 3]; 3];
 
+/// Is called with a site, the columns of its row and as many blocks.
+pub type VisitRow<'v, B> = dyn FnMut(usize, &[u32], &[B]) + 'v;
+
 /// An operator on displacements that algebraic multigrid can coarsen. It is never assembled: rows are made when asked
 /// for. All of it is the free operator: supports are told to the solver separately, as held components.
 ///
@@ -18,7 +21,7 @@ pub trait Coarsen: Operator<3> {
 
     /// Calls `visit` with every site of the range, in order, and the non-zero blocks of its row, the diagonal block
     /// among them: the columns' sites, and as many blocks. A site with an empty row (padding) is left out of everything.
-    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block]));
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>);
 
     /// A range that holds every column of these rows. Need not be tight.
     fn reach(&self, sites: Range<usize>) -> Range<usize>;

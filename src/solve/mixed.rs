@@ -229,7 +229,7 @@ fn advance(
 mod tests {
     use super::*;
     use crate::operator::Operator;
-    use crate::operator::coarsen::Block;
+    use crate::operator::coarsen::{Block, VisitRow};
     use std::ops::Range;
 
     /// A chain of springs along x, held across.
@@ -249,7 +249,7 @@ mod tests {
 
     impl Coarsen for Chain {
         fn positions(&self, _: Range<usize>, _: &mut [[f64; 3]]) {}
-        fn each_row(&self, _: Range<usize>, _: &mut dyn FnMut(usize, &[u32], &[Block])) {}
+        fn each_row(&self, _: Range<usize>, _: &mut VisitRow<Block>) {}
         fn reach(&self, sites: Range<usize>) -> Range<usize> {
             sites
         }

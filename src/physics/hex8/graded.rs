@@ -3,7 +3,7 @@
 use super::element::Integration;
 use super::{Hex8, kernel};
 use crate::operator::Operator;
-use crate::operator::coarsen::{Block, Coarsen};
+use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::par;
 use crate::topology::voxels::VoxelMesh;
 use rayon::prelude::*;
@@ -81,7 +81,7 @@ impl Coarsen for Graded {
         self.uniform.positions(sites, x);
     }
 
-    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
         let mut graded = Vec::with_capacity(27);
         self.uniform.each_row(sites, &mut |site, columns, _| {
             let mut sums = [[[0f32; 3]; 3]; 27];

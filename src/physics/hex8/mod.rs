@@ -9,7 +9,7 @@ mod kernel;
 mod stencils;
 
 use crate::operator::Operator;
-use crate::operator::coarsen::{Block, Coarsen};
+use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::par;
 use crate::topology::voxels::VoxelMesh;
 use element::Integration;
@@ -74,7 +74,7 @@ impl Coarsen for Hex8 {
         }
     }
 
-    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
         let mut columns = Vec::with_capacity(27);
         for segment in self.mesh.segments_in(sites) {
             for (i, node) in (0u32..).zip(segment.nodes()) {

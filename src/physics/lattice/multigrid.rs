@@ -6,7 +6,7 @@
 use super::kernel::{self, Bonds};
 use super::{Lattice, PORTION, quad, range, springs};
 use crate::operator::Operator;
-use crate::operator::coarsen::{Block, Coarsen};
+use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::simd::{Isa, isa};
 use crate::topology::sites::Sites;
 use rayon::prelude::*;
@@ -86,7 +86,7 @@ impl Coarsen for Springs<'_> {
         }
     }
 
-    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
         let (mut columns, mut blocks) = (Vec::with_capacity(19), Vec::with_capacity(19));
         for site in sites {
             let mut own = [[0.0; 3]; 3];

@@ -180,7 +180,7 @@ mod tests {
         let x: Vec<Six> = (0..4)
             .map(|i| std::array::from_fn(|c| (i * 6 + c) as f32 * 0.3 - 2.0))
             .collect();
-        let mut expected = vec![[0.0; 6]; 4];
+        let mut expected = [[0.0; 6]; 4];
         for &p in &places {
             let b = block(p);
             for r in 0..6 {

@@ -7,6 +7,7 @@ use super::fine::Body;
 use super::grouping;
 use super::level::{Level, Modes, Six};
 use super::rigid::{self, Mat6};
+use crate::operator::coarsen::VisitRow;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -157,7 +158,7 @@ impl Level<6> for Coarse {
         self.matrix.multiply(sites, x, y);
     }
 
-    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[[Six; 6]])) {
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<[Six; 6]>) {
         let (mut columns, mut squares) = (Vec::new(), Vec::new());
         for site in sites {
             columns.clear();

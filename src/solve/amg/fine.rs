@@ -5,7 +5,7 @@ use super::diagonal::Diagonal;
 use super::grouping;
 use super::level::{Level, Modes, NONE, Six};
 use super::rigid::{self, Basis, Mat6};
-use crate::operator::coarsen::{Block, Coarsen};
+use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::operator::held::Held;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -204,7 +204,7 @@ impl<O: Coarsen> Level<3> for Fine<'_, O> {
         self.operator.rows_f32(sites, x, y);
     }
 
-    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
         self.operator.each_row(sites, visit);
     }
 

@@ -1,6 +1,7 @@
 //! Owns what the cycle, the smoother and the Galerkin product know of one level.
 
 use super::aggregate::Aggregates;
+use crate::operator::coarsen::VisitRow;
 use std::ops::Range;
 
 /// No aggregate: padding, or a site with nothing free.
@@ -18,7 +19,7 @@ pub trait Level<const D: usize>: Sync {
     /// Rows of `A x`, as [`crate::operator::coarsen::Coarsen::rows_f32`].
     fn rows(&self, sites: Range<usize>, x: &[[f32; D]], y: &mut [[f32; D]]);
     /// Calls `visit` with every site of the range, in order, and the columns and blocks of its row.
-    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[[[f32; D]; D]]));
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<[[f32; D]; D]>);
     /// A range that holds every column of these rows.
     fn reach(&self, sites: Range<usize>) -> Range<usize>;
     /// `D⁻¹ r` at a site, zero in held components.

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::grid::Grid;
 use crate::mask::resample;
 use crate::operator::Operator;
-use crate::operator::coarsen::{Block, Coarsen};
+use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::physics::hex8::Hex8;
 use crate::physics::hex8::element::Integration;
 use crate::physics::hex8::graded::Graded;
@@ -110,7 +110,7 @@ impl Coarsen for Bricks {
         }
     }
 
-    fn each_row(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32], &[Block])) {
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
         match self {
             Bricks::Equal(model) => model.each_row(sites, visit),
             Bricks::Graded(model) => model.each_row(sites, visit),

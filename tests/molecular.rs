@@ -379,8 +379,8 @@ fn couple_stresses_make_the_local_boundary_layer_of_rotation() {
 /// Cooling of an insulated square: a cosine decays as exp(-π²Dt/L²), calibrated stencil, surfaces corrected.
 #[test]
 fn transient_heat_follows_its_series() {
+    use bonepd_ct::stage::molecular::conduction::Transient;
     use bonepd_ct::stage::molecular::setup::Setup;
-    use bonepd_ct::stage::molecular::steady::Transient;
     use bonepd_ct::stage::scene::Physics;
     let text = "title = 'square'
         [geometry.rectangle]
@@ -488,6 +488,38 @@ fn a_scene_pays_for_its_physics_alone() {
     assert_eq!(heat.unknowns, 240 - 12);
 }
 
+/// A coupled scene solves for 3 unknowns per point and, in a system of its own, 1 more; broken bonds stop conducting, so
+/// that the potential between the crack's lips rises as it grows, and never falls.
+#[test]
+fn the_potential_drop_rises_with_the_crack() {
+    let wired = "conduction = { conductivity = [2, 1, 0], exponent = 4, probes = [[-14.5, 1.5], [-14.5, -1.5]] }";
+    let (alone, _) = strip("", 0.2);
+    let leads =
+        "load = [{ region = { box = [-15, 8, -13, 10] }, component = 'potential', value = 1 }]
+        hold = [{ region = { edge = 'bottom' }, component = 'y' },
+                { region = { edge = 'bottom' }, component = 'x' },
+                { region = { box = [-15, -10, -13, -8] }, component = 'potential' },";
+    let (coupled, kept) = solved(
+        &strip_text("", 0.2)
+            .replace("cracks =", &format!("{wired}\n        cracks ="))
+            .replace(
+                "hold = [{ region = { edge = 'bottom' }, component = 'y' },
+                { region = { edge = 'bottom' }, component = 'x' },",
+                leads,
+            ),
+    );
+    assert_eq!(alone.unknowns, coupled.unknowns);
+    let (drop, length) = (kept.column("potential_drop"), kept.column("crack_length"));
+    assert!(length.last().unwrap() > &5.0, "{length:?}");
+    assert!(
+        drop[0] > 0.0 && drop.last().unwrap() > &(1.05 * drop[0]),
+        "{drop:?}"
+    );
+    for pair in drop.windows(2) {
+        assert!(pair[1] >= pair[0] * (1.0 - 1e-9), "{drop:?}");
+    }
+}
+
 #[test]
 fn senseless_scenes_are_refused_in_words() {
     let nothing = refused(&format!("{PLATE}[physics.continuum-molecular]"));
@@ -515,7 +547,11 @@ fn senseless_scenes_are_refused_in_words() {
 }
 
 fn strip(extra: &str, end: f64) -> (Summary, Kept) {
-    solved(&format!(
+    solved(&strip_text(extra, end))
+}
+
+fn strip_text(extra: &str, end: f64) -> String {
+    format!(
         "title = 'notched strip'
         hold = [{{ region = {{ edge = 'bottom' }}, component = 'y' }},
                 {{ region = {{ edge = 'bottom' }}, component = 'x' }},
@@ -540,7 +576,7 @@ fn strip(extra: &str, end: f64) -> (Summary, Kept) {
         [physics.continuum-molecular.fracture]
         energy = [0.5, 0.5]
         tip = [-5, 0]"
-    ))
+    )
 }
 
 /// Work put in is elastic energy plus what broken bonds held plus what was given up on the way to equilibrium, at every
@@ -637,6 +673,50 @@ fn a_scanned_stiffness_is_cut_to_the_scenes_plane() {
     let scanned = energy("from_scan = { file = 'c.json', axes = ['x', 'z'] }");
     let known = energy("young = 1000\npoisson = 0.2");
     assert!((scanned / known - 1.0).abs() < 1e-12, "{scanned} {known}");
+}
+
+/// From a file: the 6 x 6 stiffness that `solve --load stiffness` writes, or a hand-made one, is read beside the scene
+/// and cut; energy of a stretched block follows its plane modulus.
+#[test]
+fn a_scene_file_reads_its_stiffness_from_a_file() {
+    use bonepd_ct::run::{scene::scene, session::Session};
+    let folder = tempfile::tempdir().unwrap();
+    let quiet = Session {
+        quiet: true,
+        ..Session::default()
+    };
+    let six: [[f64; 6]; 6] = std::array::from_fn(|i| {
+        std::array::from_fn(|j| match (i < 3 && j < 3, i == j) {
+            (true, true) => 300.0 - 50.0 * i as f64,
+            (true, false) => 60.0,
+            (false, true) => 80.0,
+            _ => 0.0,
+        })
+    });
+    let json = serde_json::json!({ "stiffness_mpa": six });
+    std::fs::write(folder.path().join("stiffness.json"), json.to_string()).unwrap();
+    let text = |axes: &str| {
+        format!(
+            "hold = [{{ region = {{ edge = 'left' }}, component = 'x' }},
+                    {{ region = {{ edge = 'left' }}, component = 'y' }},
+                    {{ region = {{ edge = 'right' }}, component = 'x', value = 0.1 }}]
+            {PLATE}
+            [physics.continuum-molecular.elasticity]
+            from_scan = {{ file = 'stiffness.json', axes = {axes} }}"
+        )
+    };
+    let energy = |axes: &str| {
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, text(axes)).unwrap();
+        let (_, record) = scene(&path, &folder.path().join("out"), &quiet).unwrap();
+        record.unwrap().last["energy"].as_f64().unwrap()
+    };
+    let (along_x, along_z) = (energy("['x', 'y']"), energy("['z', 'y']"));
+    assert!(along_x > 1.3 * along_z, "{along_x} {along_z}");
+    std::fs::remove_file(folder.path().join("stiffness.json")).unwrap();
+    let path = folder.path().join("scene.toml");
+    let error = scene(&path, &folder.path().join("out"), &quiet).unwrap_err();
+    assert!(error.to_string().contains("stiffness.json"), "{error}");
 }
 
 /// Peak force of a compact tension specimen of cortical bone, slit along the bone's axis: W = 25.8 mm, 1.25 W x 1.2 W,

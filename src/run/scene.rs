@@ -3,12 +3,12 @@
 
 use crate::error::{Error, Result};
 use crate::io::map::{self, Range};
-use crate::io::{atomic, plot, points as files, scan};
+use crate::io::{atomic, plot, points as files, scan, stiffness};
 use crate::run::Outcome;
 use crate::run::session::Session;
 use crate::stage::report::figure::{Axis, Content, Curve, Figure, Mark, Point};
 use crate::stage::scene::frame::{Field, Frame, Observer, Output, Summary, Values};
-use crate::stage::scene::{Inputs, Scene, run};
+use crate::stage::scene::{Inputs, Physics, Scene, run};
 use crate::topology::outline::{Bitmap, Outline};
 use crate::topology::plane::Points;
 use indicatif::ProgressBar;
@@ -40,7 +40,8 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
     })?;
     let mut scene = Scene::parse(&text, path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
-    let inputs = read_inputs(&mut scene, folder)?;
+    let mut inputs = read_inputs(&mut scene, folder)?;
+    inputs.stiffness = read_stiffness(&scene, folder)?;
     if session.dry_run {
         let points = scene.points(&inputs)?;
         session.say(format!(
@@ -131,6 +132,16 @@ fn read_inputs(scene: &mut Scene, folder: &Path) -> Result<Inputs> {
         }
         _ => Ok(Inputs::default()),
     }
+}
+
+/// The apparent stiffness that a continuum-molecular scene takes from a scan, if it does.
+fn read_stiffness(scene: &Scene, folder: &Path) -> Result<Option<[[f64; 6]; 6]>> {
+    let Physics::ContinuumMolecular(model) = &scene.physics else {
+        return Ok(None);
+    };
+    let scan = model.elasticity.as_ref().and_then(|e| e.from_scan.as_ref());
+    scan.map(|s| stiffness::read(&folder.join(&s.file)))
+        .transpose()
 }
 
 /// Slice `index` along `axis`: the two other axes in order, the first fastest.

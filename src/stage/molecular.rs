@@ -1,6 +1,9 @@
 //! Owns continuum-molecular scenes: which physics a scene has, and which solution that asks for. Lengths in mm, forces
 //! in N, moduli in MPa, or any consistent units.
 
+pub mod conduction;
+pub mod crack;
+pub mod equilibrium;
 pub mod fracture;
 pub mod modes;
 pub mod setup;
@@ -146,7 +149,7 @@ pub struct Fracture {
     /// At one load the bonds whose energy ratio is within this share of the largest break together.
     #[serde(default = "tenth")]
     pub batch: f64,
-    /// Stop when a bond centred here breaks.
+    /// Stop when the crack gets here: when a bond between nearest neighbours, one of them in the region, breaks.
     #[serde(default)]
     pub stop: Option<Region>,
     /// Where a bond never breaks.
@@ -278,7 +281,7 @@ pub fn run(
                 "add the table of at least one",
             ));
         };
-        return steady::conduct(scene, model, conduction, &setup, observer);
+        return conduction::conduct(scene, model, conduction, &setup, observer);
     };
     let tensor = elasticity.tensor(inputs)?;
     let micro = setup.micromoduli(elasticity, &tensor)?;

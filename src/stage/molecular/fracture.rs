@@ -5,15 +5,18 @@
 //! instead of being halved until it is near. Work, elastic energy, the energy of broken bonds and the energy given up
 //! while the body moves to its new equilibrium at constant load are counted separately and must balance.
 
+mod report;
+mod watch;
+
+use super::crack::Crack;
 use super::setup::{DISPLACEMENT, Setup, Solid};
-use super::steady::{displacement, drop, potential, scalar, summary};
 use super::window::{Window, WindowBond, opposite};
 use super::{Fracture, Molecular};
 use crate::error::{Error, Result};
 use crate::physics::anisotropic::body::{Body, RESIDUAL};
 use crate::physics::anisotropic::toughness::critical_energy;
 use crate::stage::scene::Scene;
-use crate::stage::scene::frame::{Frame, Observer, Summary};
+use crate::stage::scene::frame::{Observer, Summary};
 use rayon::prelude::*;
 
 /// Running sums, per unit thickness.
@@ -36,7 +39,7 @@ struct Front<'a, const D: usize> {
     critical: Vec<f64>,
     /// Points at which bonds never break.
     sound: Vec<bool>,
-    stop: Vec<bool>,
+    crack: Crack,
     /// One flag per listed bond.
     broken: Vec<bool>,
     conductor: Option<Body<1>>,
@@ -50,23 +53,15 @@ struct Front<'a, const D: usize> {
     lambda: f64,
     recorded: f64,
     ledger: Ledger,
-    count: usize,
-    length: f64,
-    /// Sum of the centres of broken nearest-neighbour bonds, from the tip.
-    lean: [f64; 2],
-    end_point: [f64; 2],
     peak: f64,
     worst_balance: f64,
     solves: usize,
     iterations: usize,
     windows: usize,
-    stopped: bool,
     /// As of the last accepted load.
     potential_drop: f64,
 }
 
-/// Dense points of a window about each seed reach this many spacings.
-const REACH: f64 = 13.0;
 /// Events at constant load between looks at the whole body.
 const LOOK: usize = 25;
 
@@ -106,8 +101,8 @@ pub fn run<const D: usize>(
     front.record(observer, true, false)?;
     for step in 1..=steps {
         front.load_to(time.step * step as f64, observer)?;
-        front.record(observer, true, step == steps || front.stopped)?;
-        if front.stopped {
+        front.record(observer, true, step == steps || front.crack.stopped)?;
+        if front.crack.stopped {
             break;
         }
     }
@@ -196,7 +191,7 @@ impl<'a, const D: usize> Front<'a, D> {
             setup,
             solid,
             sound,
-            stop,
+            crack: Crack::new(params.tip, stop),
             conductor,
             window,
             bonds: Vec::new(),
@@ -206,115 +201,21 @@ impl<'a, const D: usize> Front<'a, D> {
             lambda: 0.0,
             recorded: 0.0,
             ledger: Ledger::default(),
-            count: 0,
-            length: 0.0,
-            lean: [0.0; 2],
-            end_point: params.tip,
             peak: 0.0,
             worst_balance: 0.0,
             solves: 0,
             iterations: 0,
             windows: 0,
-            stopped: false,
             potential_drop: 0.0,
         };
         front.move_window()?;
         Ok(front)
     }
 
-    /// Energy over critical energy of a bond under unit load; 0 where it cannot break.
-    fn ratio(&self, kind: usize, here: &[f64; D], there: &[f64; D]) -> f64 {
-        let b = &self.setup.bonds[kind];
-        let d = b.deformation(here, there);
-        if self.params.extension_only && d.stretch < 0.0 {
-            return 0.0;
-        }
-        b.energy(&self.solid.moduli[kind], &d) / self.critical[kind]
-    }
-
-    /// Ratios of the bonds of point `p` to later points, from the whole solution.
-    fn ratios(&self, p: usize) -> impl Iterator<Item = (usize, f64)> {
-        self.setup.family.range(p).filter_map(move |slot| {
-            let (q, kind) = self.setup.family.kind(slot);
-            let may = q > p && !self.broken[slot] && !self.sound[p] && !self.sound[q];
-            may.then(|| (q, self.ratio(kind, &self.x[p], &self.x[q])))
-        })
-    }
-
-    /// Renews the whole solution and what is known of the bonds outside the window.
-    fn look(&mut self) {
-        self.x = self.window.whole(&self.solid.body.blocks, &self.solid.held);
-        self.stale = false;
-        let outside = |p: usize| {
-            let bonds = self.ratios(p);
-            bonds
-                .filter(|(q, _)| !self.window.holds(p) || !self.window.holds(*q))
-                .fold(0.0_f64, |m, (_, r)| m.max(r))
-        };
-        self.far = (0..self.setup.points.len())
-            .into_par_iter()
-            .map(outside)
-            .reduce(|| 0.0, f64::max);
-    }
-
-    /// Puts a new window about the bonds nearest to breaking, and factorises the body as it is.
-    fn move_window(&mut self) -> Result<()> {
-        let worst = |p: usize| self.ratios(p).fold(0.0_f64, |m, (_, r)| m.max(r));
-        let worst: Vec<f64> = (0..self.setup.points.len())
-            .into_par_iter()
-            .map(worst)
-            .collect();
-        let largest = worst.iter().fold(0.0_f64, |m, r| m.max(*r));
-        let mut seeds: Vec<usize> = (0..worst.len())
-            .filter(|&p| worst[p] >= 0.6 * largest && worst[p] > 0.0)
-            .collect();
-        seeds.sort_by(|&a, &b| worst[b].total_cmp(&worst[a]).then(a.cmp(&b)));
-        let chosen = self.around(&seeds);
-        let (window, x) = Window::new(&self.solid.body, self.setup, &self.solid.held, &chosen)?;
-        self.window = window;
-        self.x = x;
-        let may = |slot: usize, p: usize, q: usize| {
-            !self.broken[slot] && !self.sound[p] && !self.sound[q]
-        };
-        let mut bonds = self.window.bonds(self.setup, |slot| !self.broken[slot]);
-        bonds.retain(|b| may(b.slots[0], self.window.point(b.a), self.window.point(b.b)));
-        self.bonds = bonds;
-        self.windows += 1;
-        self.look();
-        Ok(())
-    }
-
-    /// Free points within reach of the seeds, the first seeds first, up to the window's size.
-    fn around(&self, seeds: &[usize]) -> Vec<usize> {
-        let setup = self.setup;
-        let mut taken = vec![false; setup.points.len()];
-        let mut chosen = Vec::new();
-        let reach = REACH.ceil() as i32;
-        for &seed in seeds {
-            if chosen.len() >= self.params.window_points {
-                break;
-            }
-            let [i, j] = setup.points.cell(seed);
-            for dj in -reach..=reach {
-                for di in -reach..=reach {
-                    let near = f64::from(di * di + dj * dj) <= REACH * REACH;
-                    let Some(p) = setup.points.at([i + di, j + dj]).filter(|_| near) else {
-                        continue;
-                    };
-                    if !taken[p] && (0..D).all(|d| self.solid.held[p * D + d].is_none()) {
-                        taken[p] = true;
-                        chosen.push(p);
-                    }
-                }
-            }
-        }
-        chosen
-    }
-
     /// Raises the load to `target`, breaking bonds on the way.
     fn load_to(&mut self, target: f64, observer: &mut dyn Observer) -> Result<()> {
         let mut events = 0;
-        while !self.stopped {
+        while !self.crack.stopped {
             let ratios: Vec<f64> = self
                 .bonds
                 .par_iter()
@@ -417,140 +318,6 @@ impl<'a, const D: usize> Front<'a, D> {
         if let Some(conductor) = &mut self.conductor {
             conductor.scale(slots, RESIDUAL);
         }
-        self.count += 1;
-        self.stopped |= self.stop[p] || self.stop[q];
-        let (a, b) = (self.setup.points.position(p), self.setup.points.position(q));
-        let centre = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
-        let from = [
-            centre[0] - self.params.tip[0],
-            centre[1] - self.params.tip[1],
-        ];
-        // Longer bonds break ahead of the crack's faces.
-        if (a[0] - b[0]).hypot(a[1] - b[1]) < 1.1 * self.setup.points.spacing {
-            self.lean = [self.lean[0] + from[0], self.lean[1] + from[1]];
-            if from[0].hypot(from[1]) > self.length {
-                self.length = from[0].hypot(from[1]);
-                self.end_point = centre;
-            }
-        }
-    }
-
-    /// d = 1 - Σ over intact bonds/Σ over all (eq. 105).
-    fn damage(&self) -> Vec<f64> {
-        let at = |p: usize| {
-            let (mut all, mut gone) = (0.0, 0.0);
-            for slot in self.setup.family.range(p) {
-                let share = self.setup.family.entry(slot).1.share;
-                all += share;
-                gone += if self.broken[slot] { share } else { 0.0 };
-            }
-            if all > 0.0 { gone / all } else { 0.0 }
-        };
-        (0..self.setup.points.len()).map(at).collect()
-    }
-
-    fn numbers(&mut self) -> Vec<(String, f64)> {
-        let h = self.model.thickness;
-        let stiffness = self.window.twice_energy(&self.solid.body.blocks);
-        let elastic = 0.5 * stiffness * self.lambda * self.lambda;
-        let Ledger {
-            work,
-            broken,
-            relaxed,
-        } = self.ledger;
-        let balance = if work > 0.0 {
-            (work - elastic - broken - relaxed) / work
-        } else {
-            0.0
-        };
-        self.worst_balance = self.worst_balance.max(balance.abs());
-        let names = [
-            ("load", h * stiffness * self.lambda),
-            ("work", h * work),
-            ("elastic_energy", h * elastic),
-            ("broken_bond_energy", h * broken),
-            ("relaxation_energy", h * relaxed),
-            ("balance_error", balance),
-            ("broken_bonds", self.count as f64),
-            ("crack_length", self.length),
-        ];
-        names.into_iter().map(|(n, v)| (n.to_owned(), v)).collect()
-    }
-
-    /// Reports the state. At `accepted` loads with the potential, at the `last` one with all fields.
-    fn record(&mut self, observer: &mut dyn Observer, accepted: bool, last: bool) -> Result<()> {
-        let mut numbers = self.numbers();
-        let mut fields = Vec::new();
-        let due = accepted && (last || self.scene.output.due(self.recorded, self.lambda));
-        let conducting = self.conductor.as_ref().zip(self.model.conduction.as_ref());
-        if let Some((conductor, conduction)) = conducting.filter(|_| accepted) {
-            let values = potential(self.scene, self.model, self.setup, conductor)?;
-            if let Some(probes) = conduction.probes {
-                self.potential_drop = drop(self.setup, probes, &values);
-            }
-            if due {
-                fields.push(scalar("potential", values));
-            }
-        }
-        if self.conductor.is_some() {
-            numbers.push(("potential_drop".into(), self.potential_drop));
-        }
-        if due {
-            self.look();
-            fields.insert(0, scalar("damage", self.damage()));
-            fields.push(displacement(&self.x, self.lambda));
-            fields.push(scalar(
-                "displacement_y",
-                self.x.iter().map(|u| self.lambda * u[1]).collect(),
-            ));
-        }
-        if accepted {
-            self.recorded = self.lambda;
-        }
-        observer.frame(&Frame {
-            time: self.lambda,
-            numbers,
-            fields,
-        })
-    }
-
-    fn summary(&self, steps: usize) -> Summary {
-        let [x, y] = self.lean;
-        let end = [
-            self.end_point[0] - self.params.tip[0],
-            self.end_point[1] - self.params.tip[1],
-        ];
-        let numbers = [
-            ("peak_load", self.peak),
-            ("last_load_parameter", self.lambda),
-            ("broken_bonds", self.count as f64),
-            ("crack_length", self.length),
-            ("crack_end_x", self.end_point[0]),
-            ("crack_end_y", self.end_point[1]),
-            ("mean_direction_deg", y.atan2(x).to_degrees()),
-            ("end_direction_deg", end[1].atan2(end[0]).to_degrees()),
-            (
-                "broken_bond_energy",
-                self.model.thickness * self.ledger.broken,
-            ),
-            (
-                "relaxation_energy",
-                self.model.thickness * self.ledger.relaxed,
-            ),
-            ("work", self.model.thickness * self.ledger.work),
-            ("worst_balance_error", self.worst_balance),
-            ("solves", self.solves as f64),
-            ("solve_iterations", self.iterations as f64),
-            ("windows", self.windows as f64),
-        ];
-        let numbers = numbers
-            .into_iter()
-            .map(|(n, v)| (n.to_owned(), v))
-            .collect();
-        let mut summary = summary(self.setup, self.window.unknowns(), steps, numbers);
-        if self.stopped {
-            summary.stopped = Some("the crack reached the stop region".into());
-        }
-        summary
+        self.crack.grow(&self.setup.points, [p, q]);
     }
 }

@@ -1,7 +1,8 @@
 //! Owns natural vibration: the lowest modes of K v = ω² M v (eq. 91).
 
 use super::Vibration;
-use super::setup::{Setup, Solid, factorise};
+use super::equilibrium::factorise;
+use super::setup::{Setup, Solid};
 use super::steady::{displacement, scalar, summary};
 use crate::error::{Error, Result};
 use crate::solve::lanczos::{Mode, lowest};

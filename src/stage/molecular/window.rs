@@ -1,7 +1,8 @@
 //! Owns the moving window about a crack front: the rest of the body is condensed onto its points, so that bonds broken
 //! inside it cost a dense solve of the window alone.
 
-use super::setup::{Factorised, Setup, factorise, right_hand_side};
+use super::equilibrium::{Factorised, factorise, right_hand_side};
+use super::setup::Setup;
 use crate::error::Result;
 use crate::physics::anisotropic::body::Body;
 use crate::physics::anisotropic::bond::Blocks;

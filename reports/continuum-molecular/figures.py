@@ -1,0 +1,122 @@
+"""Curves of reports/continuum-molecular.md from the folders that `bonepd-ct scene` wrote (PyPI: matplotlib, pillow).
+
+    python3 reports/continuum-molecular/figures.py RUNS reports/continuum-molecular
+
+RUNS holds one folder per scene, named as below; what is missing is left out and said.
+"""
+
+import csv
+import json
+import pathlib
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+RUNS, OUT = map(pathlib.Path, sys.argv[1:3])
+# Okabe and Ito's colours; dashes and markers repeat what they say.
+HUES = ["#0072B2", "#D55E00", "#000000", "#009E73"]
+DASHES = ["-", "--", ":", "-."]
+MARKS = ["o", "s", "D", "^"]
+plt.rcParams.update({"font.family": "DejaVu Sans", "font.size": 9, "axes.grid": True, "grid.color": "#cccccc"})
+
+
+def history(name):
+    """Columns of a run's history, or None."""
+    path = RUNS / name / "history.csv"
+    if not path.exists():
+        print(f"left out: {path} is missing")
+        return None
+    rows = list(csv.DictReader(open(path)))
+    return {key: [float(row[key]) for row in rows] for key in rows[0]}
+
+
+def save(name):
+    plt.tight_layout()
+    plt.savefig(OUT / f"{name}.png", dpi=110)
+    plt.close()
+
+
+def energy_angle():
+    plt.figure(figsize=(5.2, 3.2))
+    for k, (material, load) in enumerate((m, l) for m in ("square", "anisotropic") for l in ("extension", "shear")):
+        h = history(f"energy-angle-{material}-{load}")
+        if h is None:
+            continue
+        bias = [100 * (a / b - 1) for a, b in zip(h["energy_density_inside"], h["energy_density_local"])]
+        plt.plot(h["t"], bias, DASHES[k], color=HUES[k], marker=MARKS[k], ms=4, label=f"{material}, {load}")
+    plt.xlabel("material angle (degrees)")
+    plt.ylabel("discrete over local energy - 1 (%)")
+    plt.ylim(bottom=0)
+    plt.legend(fontsize=8)
+    save("energy-angle")
+
+
+def plate():
+    h = history("notched-plate")
+    if h is None:
+        return
+    plt.figure(figsize=(5.2, 3.2))
+    plt.plot(h["t"], [f / 1000 for f in h["load"]], color=HUES[0], lw=1)
+    plt.xlabel("displacement of the upper pin (mm)")
+    plt.ylabel("load (kN)")
+    plt.xlim(left=0)
+    plt.ylim(bottom=0)
+    save("plate-load")
+
+
+def compact_tension():
+    runs = [(z, history(f"compact-tension-{z}")) for z in (0, 45, 60, 90)]
+    runs = [(z, h) for z, h in runs if h]
+    plt.figure(figsize=(5.2, 3.2))
+    for k, (z, h) in enumerate(runs):
+        plt.plot(h["t"], h["load"], DASHES[k], color=HUES[k], lw=1, label=f"{z}°")
+    plt.xlabel("opening of the pins (mm)")
+    plt.ylabel("load per thickness (N/mm)")
+    plt.xlim(left=0)
+    plt.ylim(bottom=0)
+    plt.legend(title="bone's axis", fontsize=8)
+    save("compact-tension-load")
+    plt.figure(figsize=(5.2, 3.2))
+    for k, (z, h) in enumerate(runs):
+        drop = h["potential_drop"]
+        # The potential is solved for at accepted steps only: the last state of each value is its own.
+        kept = [i for i in range(len(drop)) if i == 0 or drop[i] != drop[i - 1]]
+        plt.plot([h["crack_length"][i] for i in kept], [drop[i] / drop[0] for i in kept], DASHES[k], color=HUES[k],
+                 marker=MARKS[k], ms=3, label=f"{z}°")
+    plt.xlabel("crack extension (mm)")
+    plt.ylabel("potential drop over its first value")
+    plt.legend(title="bone's axis", fontsize=8)
+    save("potential-drop")
+
+
+def kinking():
+    """Criteria of maximum hoop stress, as the report's text prints them for 0, 10, ... 90 degrees."""
+    criterion = {
+        "silicon": [0, -18.9, -33.1, -42.6, -49.3, -54.4, -58.6, -62.2, -65.6, -68.9],
+        "anisotropic": [0, -19.7, -33.8, -43.8, -51.1, -56.8, -61.4, -65.5, -69.2, -72.7],
+    }
+    figure, axes = plt.subplots(1, 2, figsize=(7.4, 3.2), sharey=True)
+    for axis, (material, angles) in zip(axes, criterion.items()):
+        axis.plot(range(0, 91, 10), [-a for a in angles], color=HUES[2], lw=1, label="maximum hoop stress")
+        path = RUNS / f"crack-kinking-{material}" / "scene.json"
+        if path.exists():
+            numbers = dict(json.load(open(path))["numbers"])
+            for k, name in enumerate(("end_direction_deg",)):
+                found = {float(key.split("_at_")[1]): -v for key, v in numbers.items() if key.startswith(name)}
+                axis.plot(found.keys(), found.values(), MARKS[k], color=HUES[k], ms=5, label="computed")
+                rest = [abs(found[a] + angles[int(a / 10)]) for a in found]
+                print(f"{material}, {name}: mean deviation {sum(rest) / len(rest):.2f} degrees, largest {max(rest):.2f}")
+        axis.set_title({"silicon": "silicon <100>", "anisotropic": "fully anisotropic"}[material], fontsize=9)
+        axis.set_xlabel("mixity (degrees)")
+    axes[0].set_ylabel("kink (degrees)")
+    axes[0].legend(fontsize=8)
+    save("kinking")
+
+
+energy_angle()
+plate()
+compact_tension()
+kinking()

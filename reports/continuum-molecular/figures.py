@@ -14,6 +14,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from PIL import Image
 
 RUNS, OUT = map(pathlib.Path, sys.argv[1:3])
 # Okabe and Ito's colours; dashes and markers repeat what they say.
@@ -116,6 +117,26 @@ def kinking():
     save("kinking")
 
 
+def maps(name, files):
+    """The program's own maps side by side, in few colours."""
+    pictures = [Image.open(RUNS / f).convert("RGB") for f in files if (RUNS / f).exists()]
+    if not pictures:
+        print(f"left out: {name}, no map of {files}")
+        return
+    sheet = Image.new("RGB", (sum(p.width for p in pictures), max(p.height for p in pictures)), "white")
+    left = 0
+    for p in pictures:
+        sheet.paste(p, (left, 0))
+        left += p.width
+    sheet.quantize(64).save(OUT / f"{name}.png", optimize=True)
+
+
+maps("heat-disc", ["heat-disc/temperature_t1.png"])
+maps("crack-tip", ["crack-tip-I/stress_yy_t1.png"])
+maps("plate", [f"notched-plate/damage_t{t}.png" for t in ("0.4", "0.8", "1.2")])
+maps("inclusion", ["square-inclusion/damage_t0.02.png"])
+maps("tetrachiral", [f"tetrachiral-modes/magnitude_t{t}.png" for t in (4, 5, 7)])
+maps("compact-tension", [f"compact-tension-{z}/damage_t0.4.png" for z in (0, 45, 60, 90)])
 energy_angle()
 plate()
 compact_tension()

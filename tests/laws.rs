@@ -7,10 +7,11 @@ use bonepd_ct::par::dot;
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::{Integration, stiffness};
 use bonepd_ct::physics::hex8::graded::Graded;
+use bonepd_ct::physics::lattice::pieces::GradedLattice;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
 use bonepd_ct::solve::cg::{CgParams, minimise};
 use bonepd_ct::solve::jacobi::Jacobi;
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build};
+use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build, build_pieces};
 use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
 use bonepd_ct::volume::{Specimen, Volume};
 use rand::{RngExt, SeedableRng};
@@ -131,7 +132,34 @@ fn models() -> Vec<Model> {
             }
         }
     }
+    rows.extend([0.0, 0.25, 0.3, 0.45].map(pieces_row));
     rows
+}
+
+fn pieces_row(poisson: f64) -> Model {
+    let case = Case {
+        structure: Structure::Sc,
+        lp_mm: 0.04,
+        boundary: Boundary::Graded,
+        registration_mm: [0.0; 3],
+    };
+    let pieces = Box::leak(Box::new(
+        build_pieces(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap(),
+    ));
+    assert!(pieces.len() > 100, "{} pieces", pieces.len());
+    let moduli = Moduli::new(Structure::Sc, 0.04, 1000.0, poisson).unwrap();
+    let positions = pieces
+        .indices
+        .iter()
+        .map(|&i| pieces.frame.position_mm(i))
+        .collect();
+    let twin = GradedLattice::new(pieces, moduli);
+    Model {
+        name: format!("sc graded in pieces ν={poisson}"),
+        operator: Box::new(GradedLattice::new(pieces, moduli)),
+        positions,
+        energy: Box::new(move |u| twin.energy(u)),
+    }
 }
 
 fn random_field(n: usize, seed: u64) -> Field {

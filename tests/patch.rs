@@ -2,8 +2,9 @@
 
 use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::operator::Operator;
+use bonepd_ct::physics::lattice::pieces::GradedLattice;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build};
+use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build, build_pieces};
 use bonepd_ct::topology::sites::Sites;
 use bonepd_ct::volume::{Specimen, Volume};
 
@@ -116,5 +117,44 @@ fn an_affine_field_is_in_equilibrium_inside() {
                 );
             }
         }
+    }
+}
+
+/// Shares are 1 in solid bone: a graded lattice is the uniform one there, and its energy the solid's.
+#[test]
+fn a_graded_lattice_of_solid_bone_has_its_stiffness() {
+    let case = Case {
+        structure: Structure::Sc,
+        lp_mm: LP_MM,
+        boundary: Boundary::Graded,
+        registration_mm: [0.0; 3],
+    };
+    let pieces = build_pieces(&block(), &case, Axis::Z, 0.0).unwrap();
+    let site = (0..pieces.len())
+        .find(|&s| (0..3).all(|a| (2..4).contains(&pieces.indices[s][a])))
+        .expect("a block has an inside");
+    let strain = [[0.3, 0.1, -0.2], [0.1, -0.4, 0.25], [-0.2, 0.25, 0.7]];
+    let field: Vec<[f64; 3]> = pieces
+        .indices
+        .iter()
+        .map(|&i| {
+            let p = pieces.frame.position_mm(i);
+            std::array::from_fn(|r| (0..3).map(|c| strain[r][c] * p[c]).sum())
+        })
+        .collect();
+    for nu in POISSONS {
+        let moduli = Moduli::new(Structure::Sc, LP_MM, YOUNG_MPA, nu).unwrap();
+        let model = GradedLattice::new(&pieces, moduli);
+        let lambda = YOUNG_MPA * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
+        let mu = YOUNG_MPA / (2.0 * (1.0 + nu));
+        let trace: f64 = (0..3).map(|a| strain[a][a]).sum();
+        let squares: f64 = strain.iter().flatten().map(|e| e * e).sum();
+        let solid = (0.5 * lambda * trace * trace + mu * squares) * LP_MM.powi(3);
+        let found = model.site_energy(&field, site);
+        // Shares are single precision.
+        assert!(
+            (found / solid - 1.0).abs() < 1e-6,
+            "ν={nu}: {found} for {solid}"
+        );
     }
 }

@@ -18,13 +18,18 @@ const YOUNG_MPA: f64 = 1000.0;
 /// An unwritable file, or a graded lattice, whose bonds all differ.
 pub fn write(path: &Path, sites: &Sites) -> Result<()> {
     if sites.weights.is_some() {
-        return Err(Error::setting(
-            "--export lammps",
-            "a graded lattice has a stiffness of its own on every bond",
-            "export firm or floppy lattices",
-        ));
+        return Err(graded());
     }
     atomic::write_with(path, |out| fill(out, sites))
+}
+
+/// Why a graded lattice is not written.
+pub fn graded() -> Error {
+    Error::setting(
+        "--export lammps",
+        "a graded lattice has a stiffness of its own on every bond",
+        "export firm or floppy lattices",
+    )
 }
 
 fn fill(out: &mut impl Write, sites: &Sites) -> std::io::Result<()> {

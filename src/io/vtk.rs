@@ -2,61 +2,91 @@
 
 use crate::error::Result;
 use crate::io::atomic;
+use crate::topology::pieces::Pieces;
+use crate::topology::placement::Frame;
 use crate::topology::sites::Sites;
 use std::io::Write;
 use std::path::Path;
 
 /// A lattice as points (sites, mm) and lines (bonds), with each site's number of bonds and weight.
 pub fn write_lattice(path: &Path, sites: &Sites) -> Result<()> {
-    atomic::write_with(path, |out| lattice(out, sites))
-}
-
-fn lattice(out: &mut impl Write, sites: &Sites) -> std::io::Result<()> {
-    let frame = &sites.frame;
-    writeln!(out, "# vtk DataFile Version 3.0")?;
-    writeln!(
-        out,
-        "{} lattice, LP {} mm",
-        frame.structure.name(),
-        frame.lp_mm
-    )?;
-    writeln!(
-        out,
-        "BINARY\nDATASET POLYDATA\nPOINTS {} float",
-        sites.len()
-    )?;
-    for &at in &sites.indices {
-        for x in frame.position_mm(at) {
-            out.write_all(&(x as f32).to_be_bytes())?;
-        }
-    }
-    let bonds = sites.bonds();
-    writeln!(out, "\nLINES {bonds} {}", 3 * bonds)?;
+    let mut bonds = Vec::with_capacity(sites.bonds());
     for s in 0..sites.len() {
         let row = sites.neighbours_of(s);
-        for &end in row.iter().step_by(2).filter(|&&end| end as usize != s) {
-            for v in [2, s as i32, end as i32] {
+        let ends = row.iter().step_by(2);
+        bonds.extend(
+            ends.filter(|&&end| end as usize != s)
+                .map(|&end| [s as u32, end]),
+        );
+    }
+    let weights: Vec<f32> = match &sites.weights {
+        Some(weights) => weights.iter().map(|&w| w as f32).collect(),
+        None => vec![1.0; sites.len()],
+    };
+    write(path, &sites.frame, &sites.indices, &bonds, &weights)
+}
+
+/// [`write_lattice`] for the pieces of a graded lattice: the weight is a piece's bone fraction. Pieces of one cell lie
+/// at one point.
+pub fn write_pieces(path: &Path, pieces: &Pieces) -> Result<()> {
+    let bonds: Vec<[u32; 2]> = pieces.pairs().map(|(a, b)| [a, b]).collect();
+    write(
+        path,
+        &pieces.frame,
+        &pieces.indices,
+        &bonds,
+        &pieces.fractions,
+    )
+}
+
+fn write(
+    path: &Path,
+    frame: &Frame,
+    indices: &[[i32; 3]],
+    bonds: &[[u32; 2]],
+    weights: &[f32],
+) -> Result<()> {
+    let mut counts = vec![0i32; indices.len()];
+    bonds
+        .iter()
+        .flatten()
+        .for_each(|&end| counts[end as usize] += 1);
+    atomic::write_with(path, |out| {
+        writeln!(out, "# vtk DataFile Version 3.0")?;
+        writeln!(
+            out,
+            "{} lattice, LP {} mm",
+            frame.structure.name(),
+            frame.lp_mm
+        )?;
+        writeln!(
+            out,
+            "BINARY\nDATASET POLYDATA\nPOINTS {} float",
+            indices.len()
+        )?;
+        for &at in indices {
+            for x in frame.position_mm(at) {
+                out.write_all(&(x as f32).to_be_bytes())?;
+            }
+        }
+        writeln!(out, "\nLINES {} {}", bonds.len(), 3 * bonds.len())?;
+        for [a, b] in bonds {
+            for v in [2, *a as i32, *b as i32] {
                 out.write_all(&v.to_be_bytes())?;
             }
         }
-    }
-    writeln!(
-        out,
-        "\nPOINT_DATA {}\nSCALARS bonds int 1\nLOOKUP_TABLE default",
-        sites.len()
-    )?;
-    for s in 0..sites.len() {
-        let count = sites
-            .neighbours_of(s)
-            .iter()
-            .filter(|&&end| end as usize != s)
-            .count() as i32;
-        out.write_all(&count.to_be_bytes())?;
-    }
-    writeln!(out, "\nSCALARS weight float 1\nLOOKUP_TABLE default")?;
-    for s in 0..sites.len() {
-        let weight = sites.weights.as_ref().map_or(1.0, |w| w[s] as f32);
-        out.write_all(&weight.to_be_bytes())?;
-    }
-    writeln!(out)
+        writeln!(
+            out,
+            "\nPOINT_DATA {}\nSCALARS bonds int 1\nLOOKUP_TABLE default",
+            indices.len()
+        )?;
+        for count in counts {
+            out.write_all(&count.to_be_bytes())?;
+        }
+        writeln!(out, "\nSCALARS weight float 1\nLOOKUP_TABLE default")?;
+        for weight in weights {
+            out.write_all(&weight.to_be_bytes())?;
+        }
+        writeln!(out)
+    })
 }

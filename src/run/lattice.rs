@@ -5,7 +5,10 @@ use crate::grid::Axis;
 use crate::io::{atomic, lammps, vtk};
 use crate::run::segment::load;
 use crate::run::session::Session;
-use crate::stage::lattice::{Case, LatticeParams, LatticeSummary, build, summarise};
+use crate::stage::lattice::{
+    Case, LatticeParams, LatticeSummary, build, build_pieces, summarise, summarise_pieces,
+};
+use crate::topology::pieces::Pieces;
 use crate::topology::sites::Sites;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -40,13 +43,18 @@ pub fn lattice(
     let specimen = load(dir)?;
     let mut lattices = Vec::new();
     for case in params.cases() {
-        let sites = build(&specimen, &case, Axis::Z, 0.0)?;
-        let summary = summarise(&specimen, &case, &sites);
+        let exports = if session.dry_run { &[] } else { exports };
+        let summary = if case.in_pieces() {
+            let pieces = build_pieces(&specimen, &case, Axis::Z, 0.0)?;
+            export(dir, &case, exports, Err(&pieces))?;
+            summarise_pieces(&specimen, &case, &pieces)
+        } else {
+            let sites = build(&specimen, &case, Axis::Z, 0.0)?;
+            export(dir, &case, exports, Ok(&sites))?;
+            summarise(&specimen, &case, &sites)
+        };
         session.say(summary.in_words());
         lattices.push(summary);
-        if !session.dry_run {
-            export(dir, &case, &sites, exports)?;
-        }
     }
     if !session.dry_run {
         write(dir, params, lattices.clone())?;
@@ -71,7 +79,13 @@ fn write(dir: &Path, params: &LatticeParams, lattices: Vec<LatticeSummary>) -> R
     atomic::write(&dir.join(RECORD), text)
 }
 
-fn export(dir: &Path, case: &Case, sites: &Sites, exports: &[Export]) -> Result<()> {
+/// Writes sites, or the pieces of a graded lattice.
+fn export(
+    dir: &Path,
+    case: &Case,
+    exports: &[Export],
+    lattice: std::result::Result<&Sites, &Pieces>,
+) -> Result<()> {
     let name = format!(
         "lattice-{}-{}-{}",
         case.structure.name(),
@@ -80,8 +94,17 @@ fn export(dir: &Path, case: &Case, sites: &Sites, exports: &[Export]) -> Result<
     );
     for format in exports {
         match format {
-            Export::Lammps => lammps::write(&dir.join(format!("{name}.data")), sites)?,
-            Export::Vtk => vtk::write_lattice(&dir.join(format!("{name}.vtk")), sites)?,
+            Export::Lammps => match lattice {
+                Ok(sites) => lammps::write(&dir.join(format!("{name}.data")), sites)?,
+                Err(_) => return Err(lammps::graded()),
+            },
+            Export::Vtk => {
+                let path = dir.join(format!("{name}.vtk"));
+                match lattice {
+                    Ok(sites) => vtk::write_lattice(&path, sites)?,
+                    Err(pieces) => vtk::write_pieces(&path, pieces)?,
+                }
+            }
         }
     }
     Ok(())

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
+use crate::topology::pieces::Pieces;
 pub use crate::topology::placement::Boundary;
 use crate::topology::placement::{Frame, weigh};
 use crate::topology::sites::{Grips, Sites};
@@ -96,14 +97,41 @@ impl LatticeParams {
     }
 }
 
+impl Case {
+    /// Whether its sites are connected pieces of bone: graded SC lattices.
+    pub fn in_pieces(&self) -> bool {
+        self.boundary == Boundary::Graded && self.structure == Structure::Sc
+    }
+}
+
 /// Builds one lattice of a specimen: places sites, joins them, drops what has no path to both grips.
 ///
 /// # Errors
 /// A lattice parameter or grip that does not fit the specimen.
 pub fn build(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<Sites> {
-    let grid = &specimen.bone.grid;
+    let (frame, grips) = lay(specimen, case, axis, grip_mm)?;
+    let weights = weigh(&frame, &specimen.bone, case.boundary);
+    Ok(Sites::connect(frame, &weights, grips))
+}
+
+/// [`build`] for a graded SC lattice: a site for each connected piece of bone in a cell.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_pieces(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<Pieces> {
+    let lp = case.lp_mm;
+    let wrapped = Case {
+        // Shifts by whole cells change nothing, but would leave the bone on one side without cells.
+        registration_mm: case.registration_mm.map(|r| r - lp * (r / lp).round()),
+        ..*case
+    };
+    let (frame, grips) = lay(specimen, &wrapped, axis, grip_mm)?;
+    Ok(Pieces::connect(frame, &specimen.bone, grips))
+}
+
+fn lay(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Frame, Grips)> {
     let frame = Frame::new(
-        grid,
+        &specimen.bone.grid,
         case.structure,
         case.lp_mm,
         case.boundary,
@@ -121,8 +149,7 @@ pub fn build(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Resu
             "give a thinner grip or a smaller lattice parameter",
         )
     })?;
-    let weights = weigh(&frame, &specimen.bone, case.boundary);
-    Ok(Sites::connect(frame, &weights, grips))
+    Ok((frame, grips))
 }
 
 /// What a lattice is made of.
@@ -136,7 +163,7 @@ pub struct LatticeSummary {
     pub fully_coordinated_sites: usize,
     /// Sites without a path of bonds to both grips.
     pub dropped_sites: usize,
-    /// Volume of the sites' cells (graded: their bone fractions) over TV.
+    /// Volume of the sites' cells (graded: their bone) over TV.
     pub lattice_bv_tv: f64,
 }
 
@@ -156,6 +183,27 @@ pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSumm
             .count(),
         dropped_sites: sites.dropped,
         lattice_bv_tv: whole * sites.cell_mm3() / specimen.tv_mm3,
+    }
+}
+
+/// [`summarise`] for a lattice of pieces. Fully coordinated are those with a neighbour along every bond.
+pub fn summarise_pieces(specimen: &Specimen, case: &Case, pieces: &Pieces) -> LatticeSummary {
+    let bone: f64 = pieces.fractions.iter().map(|&f| f64::from(f)).sum();
+    let directions = case.structure.stencil().coordination();
+    let whole = |s: &usize| {
+        let mut met = vec![false; directions];
+        pieces.bonds.of(*s).for_each(|(_, b, _)| met[b] = true);
+        met.into_iter().all(|met| met)
+    };
+    LatticeSummary {
+        structure: case.structure,
+        boundary: case.boundary,
+        lp_mm: case.lp_mm,
+        sites: pieces.len(),
+        bonds: pieces.pairs().count(),
+        fully_coordinated_sites: (0..pieces.len()).filter(whole).count(),
+        dropped_sites: pieces.dropped,
+        lattice_bv_tv: bone * case.lp_mm.powi(3) / specimen.tv_mm3,
     }
 }
 

@@ -6,6 +6,7 @@ pub mod layers;
 pub mod loaded;
 pub mod neighbours;
 pub mod outline;
+pub mod pieces;
 pub mod placement;
 pub mod plane;
 pub mod sites;

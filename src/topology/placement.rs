@@ -17,7 +17,8 @@ pub enum Boundary {
     Firm,
     /// Sites whose position lies in a bone voxel.
     Floppy,
-    /// Sites weighted by the bone fraction of their cell.
+    /// Sites weighted by the bone in their cell. SC: a site for each of its connected pieces
+    /// ([`crate::topology::pieces`]); BCC, FCC: by its fraction.
     Graded,
 }
 
@@ -74,7 +75,9 @@ impl Frame {
         let reach = 1.1 * structure.first_neighbour() * structure.steps_per_lp();
         let ring = match boundary {
             Boundary::Firm => reach.ceil() as usize - usize::from(structure == Structure::Sc),
-            Boundary::Floppy | Boundary::Graded => 0,
+            // A strip narrower than a cell is left over sideways: its bone counts, too.
+            Boundary::Graded => usize::from(structure == Structure::Sc),
+            Boundary::Floppy => 0,
         };
         let (mut n, mut rings, mut first_mm) = ([0; 3], [0; 3], [0.0; 3]);
         for a in 0..3 {
@@ -138,6 +141,12 @@ impl Frame {
         self.n.iter().product()
     }
 
+    /// Whether grid indices lie on (or, padded, beyond) an outermost proper plane along direction `c`.
+    pub fn on_side(&self, indices: [i32; 3], c: usize) -> bool {
+        let proper = self.n[c] as i32 - 2 * self.rings[c] as i32;
+        indices[c] <= 0 || indices[c] >= proper - 1
+    }
+
     /// Proper planes along the load axis.
     pub fn planes(&self) -> usize {
         self.n[self.axis.index()]
@@ -193,7 +202,7 @@ fn bone_fraction(bone: &Volume<u8>, position_mm: [f64; 3], edge: f64) -> f64 {
 }
 
 /// Voxels along one axis that a span of length `edge` around `x` overlaps, with the overlaps' lengths.
-fn overlaps(x: f64, edge: f64, h: f64, n: usize) -> Vec<(usize, f64)> {
+pub(super) fn overlaps(x: f64, edge: f64, h: f64, n: usize) -> Vec<(usize, f64)> {
     let (low, high) = (x - 0.5 * edge, x + 0.5 * edge);
     let first = (low / h).floor().max(0.0) as usize;
     let past = ((high / h).ceil().max(0.0) as usize).min(n);

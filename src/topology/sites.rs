@@ -99,13 +99,6 @@ impl Sites {
         self.indices[site][self.frame.axis.index()]
     }
 
-    /// Whether a site lies on (or, padded, beyond) an outermost proper plane along direction `c`.
-    pub fn on_side(&self, site: usize, c: usize) -> bool {
-        let proper = self.frame.n[c] as i32 - 2 * self.frame.rings[c] as i32;
-        let at = self.indices[site][c];
-        at <= 0 || at >= proper - 1
-    }
-
     /// Bonds, each counted once.
     pub fn bonds(&self) -> usize {
         let bonded = |s: usize| {

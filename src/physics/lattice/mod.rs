@@ -11,6 +11,7 @@ pub mod moduli;
 
 mod kernel;
 pub mod multigrid;
+pub mod pieces;
 mod quad;
 
 use crate::operator::Operator;

@@ -4,17 +4,20 @@ use crate::error::{Error, Result};
 use crate::measure::apparent::Loaded;
 use crate::measure::row::Row;
 use crate::operator::Operator;
+use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::par::sum_chunks;
 use crate::physics::lattice::multigrid::Springs;
+use crate::physics::lattice::pieces::{GradedLattice, GradedSprings};
 use crate::physics::lattice::{self, Lattice};
 use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
 use crate::solve::fallback::minimise_or_fall_back;
-use crate::stage::lattice::{Boundary, Case, build};
+use crate::stage::lattice::{Boundary, Case, build, build_pieces};
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::{Ends, Load, SolveParams};
-use crate::topology::sites::Sites;
+use crate::topology::placement::Frame;
+use crate::topology::sites::Grips;
 use crate::volume::Specimen;
 
 /// Solves one lattice of a specimen.
@@ -37,17 +40,85 @@ pub fn solve_lattice(
     }
     let moduli =
         lattice::Moduli::new(case.structure, case.lp_mm, params.young_mpa, params.poisson)?;
+    if case.in_pieces() {
+        let pieces = build_pieces(specimen, case, params.axis, params.grip_mm)?;
+        if pieces.is_empty() {
+            return Ok(Solved::disconnected(pieces.dropped));
+        }
+        let laid = Laid {
+            frame: &pieces.frame,
+            indices: &pieces.indices,
+            grips: pieces.grips,
+            dropped: pieces.dropped,
+        };
+        let model = GradedLattice::new(&pieces, moduli);
+        let springs = GradedSprings(&model);
+        let virial = |u: &[[f64; 3]], s| model.site_virial(u, s);
+        return Ok(solve_model(
+            &model, &springs, &virial, &laid, specimen, case, params, observe,
+        ));
+    }
     let sites = build(specimen, case, params.axis, params.grip_mm)?;
     if sites.is_empty() {
         return Ok(Solved::disconnected(sites.dropped));
     }
-    let model = Lattice::new(&sites, moduli);
-    let loaded = Loaded {
-        gauge_mm: sites.gauge_length_mm(),
-        area_mm2: specimen.area_mm2(params.axis),
-        displacement_mm: params.strain * sites.gauge_length_mm(),
+    let laid = Laid {
+        frame: &sites.frame,
+        indices: &sites.indices,
+        grips: sites.grips,
+        dropped: sites.dropped,
     };
-    let (held, mut u) = supports(&sites, params, loaded.displacement_mm);
+    let model = Lattice::new(&sites, moduli);
+    let springs = Springs::new(&model);
+    let firm = case.boundary == Boundary::Firm;
+    let virial = |u: &[[f64; 3]], s| match !firm || sites.fully_coordinated(s) {
+        true => model.site_virial(u, s),
+        false => 0.0,
+    };
+    Ok(solve_model(
+        &model, &springs, &virial, &laid, specimen, case, params, observe,
+    ))
+}
+
+/// Where a lattice's sites lie, of whichever kind they are.
+struct Laid<'a> {
+    frame: &'a Frame,
+    indices: &'a [[i32; 3]],
+    grips: Grips,
+    dropped: usize,
+}
+
+impl Laid<'_> {
+    fn plane(&self, site: usize) -> i32 {
+        self.indices[site][self.frame.axis.index()]
+    }
+
+    /// Distance of the innermost gripped planes in mm.
+    fn gauge_mm(&self) -> f64 {
+        f64::from(self.grips.high - self.grips.low) * self.frame.step_mm
+    }
+}
+
+/// Contribution of one site to the stress that counts, in N mm.
+type Virial<'a> = dyn Fn(&[[f64; 3]], usize) -> f64 + Sync + 'a;
+
+#[allow(clippy::too_many_arguments)] // what a solve is made of, once
+fn solve_model(
+    model: &impl Operator<3>,
+    springs: &impl Coarsen,
+    virial: &Virial,
+    laid: &Laid,
+    specimen: &Specimen,
+    case: &Case,
+    params: &SolveParams,
+    observe: impl FnMut(CgStep),
+) -> Solved {
+    let loaded = Loaded {
+        gauge_mm: laid.gauge_mm(),
+        area_mm2: specimen.area_mm2(params.axis),
+        displacement_mm: params.strain * laid.gauge_mm(),
+    };
+    let (held, mut u) = supports(laid, params, loaded.displacement_mm);
     let cg = CgParams {
         // Firm's headline is a linear functional: off to first order in the energy norm, so the energy must be known
         // to the square of the tolerance.
@@ -58,33 +129,33 @@ pub fn solve_lattice(
         max_iterations: params.max_iterations,
         ..CgParams::default()
     };
-    let springs = Springs::new(&model);
-    let amg = Amg::new(&springs, &held, &AmgParams::lattice(case.lp_mm));
-    let info = minimise_or_fall_back(&model, &held, &amg, &mut u, &cg, observe);
-    Ok(Solved {
-        sites: sites.len(),
-        dropped: sites.dropped,
+    let amg = Amg::new(springs, &held, &AmgParams::lattice(case.lp_mm));
+    let info = minimise_or_fall_back(model, &held, &amg, &mut u, &cg, observe);
+    Solved {
+        sites: laid.indices.len(),
+        dropped: laid.dropped,
         unknowns: held.free::<3>(),
         iterations: info.iterations,
         residual: info.residual,
         ended: info.ended,
-        moduli: assess(&model, &sites, case.boundary, &loaded, &u, &info),
-    })
+        moduli: assess(model, virial, laid, case.boundary, &loaded, &u, &info),
+    }
 }
 
 /// Which unknowns are held, and a start that meets them: the field of a homogeneous bar.
-fn supports(sites: &Sites, params: &SolveParams, displacement_mm: f64) -> (Held, Vec<[f64; 3]>) {
+fn supports(laid: &Laid, params: &SolveParams, displacement_mm: f64) -> (Held, Vec<[f64; 3]>) {
     let axis = params.axis.index();
-    let grips = sites.grips;
-    let mut held = Held::none(sites.len());
-    let mut u = vec![[0.0; 3]; sites.len()];
+    let grips = laid.grips;
+    let mut held = Held::none(laid.indices.len());
+    let mut u = vec![[0.0; 3]; laid.indices.len()];
     for (s, u) in u.iter_mut().enumerate() {
-        let plane = sites.plane(s);
+        let plane = laid.plane(s);
         let along = f64::from(plane.clamp(grips.low, grips.high) - grips.low);
         u[axis] = displacement_mm * along / f64::from(grips.high - grips.low);
         let gripped = grips.holds(plane);
         for c in 0..3 {
-            let confined = params.load == Load::Confined && c != axis && sites.on_side(s, c);
+            let on_side = laid.frame.on_side(laid.indices[s], c);
+            let confined = params.load == Load::Confined && c != axis && on_side;
             let bonded = gripped && (c == axis || params.ends == Ends::Bonded);
             if confined || bonded {
                 held.hold(s, c);
@@ -95,27 +166,24 @@ fn supports(sites: &Sites, params: &SolveParams, displacement_mm: f64) -> (Held,
 }
 
 fn assess(
-    model: &Lattice,
-    sites: &Sites,
+    model: &impl Operator<3>,
+    virial: &Virial,
+    laid: &Laid,
     boundary: Boundary,
     loaded: &Loaded,
     u: &[[f64; 3]],
     info: &CgInfo,
 ) -> Moduli {
-    let axis = sites.frame.axis.index();
-    let mut force = vec![[0.0; 3]; sites.len()];
+    let (axis, sites) = (laid.frame.axis.index(), laid.indices.len());
+    let mut force = vec![[0.0; 3]; sites];
     model.apply(u, &mut force);
-    let high = |s: &usize| sites.plane(*s) >= sites.grips.high;
-    let reaction: f64 = (0..sites.len()).filter(high).map(|s| force[s][axis]).sum();
-    let firm = boundary == Boundary::Firm;
-    let virial = sum_chunks(sites.len(), |range| {
-        let counted = |s: &usize| !firm || sites.fully_coordinated(*s);
-        range.filter(counted).map(|s| model.site_virial(u, s)).sum()
-    });
+    let high = |s: &usize| laid.plane(*s) >= laid.grips.high;
+    let reaction: f64 = (0..sites).filter(high).map(|s| force[s][axis]).sum();
+    let virial = sum_chunks(sites, |range| range.map(|s| virial(u, s)).sum());
     let from_energy_mpa = loaded.from_energy(info.energy);
     let from_stress_mpa = loaded.from_virial(virial);
     let relative = info.energy_error / info.energy;
-    let (e_app_mpa, algebraic_error_mpa) = if firm {
+    let (e_app_mpa, algebraic_error_mpa) = if boundary == Boundary::Firm {
         (from_stress_mpa, relative.sqrt() * from_stress_mpa.abs())
     } else {
         (from_energy_mpa, relative * from_energy_mpa)

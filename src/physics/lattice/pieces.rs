@@ -1,0 +1,266 @@
+//! Owns the graded lattice: the lattice element with a share of a whole bond's stiffness on each bond.
+//!
+//! `U = Σ_i [ ½ Σ_s k_s Σ_j σ_ij dl_ij² + ½ T Σ_s (N_s / Σ_j σ_ij) (Σ_j σ_ij dl_ij)² ]` with shares `σ` and `N_s` bonds
+//! of a whole site in shell `s`. Where all shares are 1 this is the uniform lattice, and by Cauchy and Schwarz it is never
+//! negative where the uniform one is not (`k_s + N_s T >= 0`), whatever the shares.
+
+use super::Moduli;
+use crate::operator::Operator;
+use crate::operator::coarsen::{Block, Coarsen};
+use crate::topology::pieces::Pieces;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Sites a task takes at once.
+const PORTION: usize = 512;
+
+/// What is the same for all bonds of one direction of the stencil.
+#[derive(Debug, Clone, Copy)]
+struct Direction {
+    d: [f64; 3],
+    shell: usize,
+    /// `k / (2 |d|²)`: a whole bond pulls by `spring · d (d · Δu)`.
+    spring: f64,
+    /// `1 / (2 |d|)`: a bond stretches by `half · d · Δu`.
+    half: f64,
+}
+
+/// The linearised graded lattice as an operator: `K u` is the gradient of the energy. N and mm.
+pub struct GradedLattice<'a> {
+    pieces: &'a Pieces,
+    moduli: Moduli,
+    directions: Vec<Direction>,
+    /// `T N_s / Σ σ` of each site and shell; empty at ν = ¼, where no volumetric pass is made.
+    volumetric: Vec<[f64; 2]>,
+}
+
+impl<'a> GradedLattice<'a> {
+    pub fn new(pieces: &'a Pieces, moduli: Moduli) -> Self {
+        let stencil = pieces.frame.structure.stencil();
+        let direction = |b: usize| {
+            let d = stencil.direction(b).map(f64::from);
+            let squared: f64 = d.iter().map(|c| c * c).sum();
+            let shell = usize::from(b / 2 >= stencil.first_shell_pairs);
+            Direction {
+                d,
+                shell,
+                spring: 0.5 * moduli.k[shell] / squared,
+                half: 0.5 / squared.sqrt(),
+            }
+        };
+        let directions: Vec<Direction> = (0..stencil.coordination()).map(direction).collect();
+        let mut whole = [0.0; 2];
+        directions.iter().for_each(|d| whole[d.shell] += 1.0);
+        let coefficients = |site: usize| {
+            let mut shares = [0.0; 2];
+            for (_, b, share) in pieces.bonds.of(site) {
+                shares[directions[b].shell] += f64::from(share);
+            }
+            let of = |s: usize| {
+                if shares[s] > 0.0 {
+                    moduli.t * whole[s] / shares[s]
+                } else {
+                    0.0
+                }
+            };
+            [of(0), of(1)]
+        };
+        let sites = if moduli.t == 0.0 { 0 } else { pieces.len() };
+        GradedLattice {
+            volumetric: (0..sites).into_par_iter().map(coefficients).collect(),
+            pieces,
+            moduli,
+            directions,
+        }
+    }
+
+    /// Elongations of a site's bonds: end, direction, share, `dl`.
+    #[inline]
+    fn stretched<'b>(
+        &'b self,
+        u: &'b [[f64; 3]],
+        site: usize,
+    ) -> impl Iterator<Item = (usize, &'b Direction, f64, f64)> + 'b {
+        self.pieces.bonds.of(site).map(move |(end, b, share)| {
+            let d = &self.directions[b];
+            let along: f64 = (0..3).map(|c| d.d[c] * (u[end][c] - u[site][c])).sum();
+            (end, d, f64::from(share), d.half * along)
+        })
+    }
+
+    /// `T N_s / Σ σ · Σ σ dl` of both shells.
+    fn pressures(&self, u: &[[f64; 3]], site: usize) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for (_, d, share, dl) in self.stretched(u, site) {
+            sums[d.shell] += share * dl;
+        }
+        let t = self.volumetric[site];
+        [t[0] * sums[0], t[1] * sums[1]]
+    }
+
+    /// Energy of one site in N mm, by the formula of the module's head.
+    pub fn site_energy(&self, u: &[[f64; 3]], site: usize) -> f64 {
+        let (mut energy, mut sums) = (0.0, [0.0; 2]);
+        for (_, d, share, dl) in self.stretched(u, site) {
+            energy += 0.5 * self.moduli.k[d.shell] * share * dl * dl;
+            sums[d.shell] += share * dl;
+        }
+        let t = self.volumetric.get(site).copied().unwrap_or_default();
+        energy + 0.5 * (t[0] * sums[0] * sums[0] + t[1] * sums[1] * sums[1])
+    }
+
+    /// Elastic energy in N mm.
+    pub fn energy(&self, u: &[[f64; 3]]) -> f64 {
+        crate::par::sum_chunks(self.pieces.len(), |sites| {
+            sites.map(|s| self.site_energy(u, s)).sum()
+        })
+    }
+
+    /// `V σ` of one site along the load axis in N mm: the derivative of its energy by a strain along it. Of a bond, only
+    /// the part between the innermost gripped planes counts.
+    pub fn site_virial(&self, u: &[[f64; 3]], site: usize) -> f64 {
+        let (axis, grips) = (self.pieces.frame.axis.index(), self.pieces.grips);
+        let plane = self.pieces.indices[site][axis];
+        let pressures = if self.volumetric.is_empty() {
+            [0.0; 2]
+        } else {
+            self.pressures(u, site)
+        };
+        let part = |(_, d, share, dl): (usize, &Direction, f64, f64)| {
+            let other = plane + d.d[axis] as i32;
+            let inside = plane.max(other).min(grips.high) - plane.min(other).max(grips.low);
+            if inside <= 0 {
+                return 0.0;
+            }
+            let lever = d.half * d.d[axis] * d.d[axis] * self.pieces.frame.step_mm;
+            let inside = f64::from(inside) / d.d[axis].abs();
+            inside * lever * share * (self.moduli.k[d.shell] * dl + pressures[d.shell])
+        };
+        self.stretched(u, site).map(part).sum()
+    }
+}
+
+impl Operator<3> for GradedLattice<'_> {
+    fn sites(&self) -> usize {
+        self.pieces.len()
+    }
+
+    fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        assert_eq!(x.len(), self.sites());
+        let pressures: Vec<[f64; 2]> = (0..self.volumetric.len())
+            .into_par_iter()
+            .with_min_len(PORTION)
+            .map(|site| self.pressures(x, site))
+            .collect();
+        let row = |site: usize| {
+            let mut f = [0.0; 3];
+            for (end, d, share, dl) in self.stretched(x, site) {
+                let mut pull = 2.0 * self.moduli.k[d.shell] * dl;
+                if let (Some(here), Some(there)) = (pressures.get(site), pressures.get(end)) {
+                    pull += here[d.shell] + there[d.shell];
+                }
+                (0..3).for_each(|c| f[c] -= share * pull * d.half * d.d[c]);
+            }
+            f
+        };
+        y.par_iter_mut()
+            .with_min_len(PORTION)
+            .enumerate()
+            .for_each(|(site, y)| *y = row(site));
+    }
+
+    fn diagonal(&self, d: &mut [[f64; 3]]) {
+        d.par_iter_mut().enumerate().for_each(|(site, d)| {
+            let (mut own, mut gradient) = ([0.0; 3], [[0.0; 3]; 2]);
+            for (end, b, share) in self.pieces.bonds.of(site) {
+                let (share, b) = (f64::from(share), &self.directions[b]);
+                let there = self.volumetric.get(end).map_or(0.0, |t| t[b.shell]);
+                for c in 0..3 {
+                    let step = b.half * b.d[c];
+                    own[c] += share * b.spring * b.d[c] * b.d[c] + there * (share * step).powi(2);
+                    gradient[b.shell][c] += share * step;
+                }
+            }
+            let t = self.volumetric.get(site).copied().unwrap_or_default();
+            for c in 0..3 {
+                own[c] += t[0] * gradient[0][c].powi(2) + t[1] * gradient[1][c].powi(2);
+            }
+            *d = own;
+        });
+    }
+}
+
+/// What multigrid sees of a graded lattice: its springs.
+pub struct GradedSprings<'a>(pub &'a GradedLattice<'a>);
+
+impl GradedSprings<'_> {
+    /// Neighbour and spring of each bond of a site.
+    fn springs(&self, site: usize) -> impl Iterator<Item = (usize, [f64; 3], f64)> + '_ {
+        let bonds = self.0.pieces.bonds.of(site);
+        bonds.map(|(end, b, share)| {
+            let d = &self.0.directions[b];
+            (end, d.d, d.spring * f64::from(share))
+        })
+    }
+}
+
+impl Operator<3> for GradedSprings<'_> {
+    fn sites(&self) -> usize {
+        self.0.sites()
+    }
+
+    fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        let row = |site: usize| {
+            let mut f = [0.0; 3];
+            for (end, d, spring) in self.springs(site) {
+                let along: f64 = (0..3).map(|c| d[c] * (x[site][c] - x[end][c])).sum();
+                (0..3).for_each(|c| f[c] += spring * along * d[c]);
+            }
+            f
+        };
+        y.par_iter_mut()
+            .with_min_len(PORTION)
+            .enumerate()
+            .for_each(|(site, y)| *y = row(site));
+    }
+
+    fn diagonal(&self, d: &mut [[f64; 3]]) {
+        d.par_iter_mut().enumerate().for_each(|(site, own)| {
+            *own = [0.0; 3];
+            for (_, d, spring) in self.springs(site) {
+                (0..3).for_each(|c| own[c] += spring * d[c] * d[c]);
+            }
+        });
+    }
+}
+
+impl Coarsen for GradedSprings<'_> {
+    fn position(&self, site: usize) -> [f64; 3] {
+        let pieces = self.0.pieces;
+        pieces.frame.position_mm(pieces.indices[site])
+    }
+
+    fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>) {
+        let mut own = [[0f32; 3]; 3];
+        for (end, d, spring) in self.springs(site) {
+            let block = d.map(|a| d.map(|b| (spring * a * b) as f32));
+            for (own, row) in own.iter_mut().zip(&block) {
+                (0..3).for_each(|b| own[b] += row[b]);
+            }
+            blocks.push((end as u32, block.map(|r| r.map(|v| -v))));
+        }
+        blocks.push((site as u32, own));
+    }
+
+    fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
+        for (site, y) in sites.zip(y) {
+            let mut f = [0f32; 3];
+            for (end, d, spring) in self.springs(site) {
+                let d = d.map(|c| c as f32);
+                let along: f32 = (0..3).map(|c| d[c] * (x[site][c] - x[end][c])).sum();
+                (0..3).for_each(|c| f[c] += spring as f32 * along * d[c]);
+            }
+            *y = f;
+        }
+    }
+}

@@ -1,5 +1,6 @@
 //! One test program. Each module is one subject.
 
+mod accuracy;
 mod apparent;
 mod cli;
 mod cohort;

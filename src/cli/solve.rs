@@ -22,6 +22,10 @@ pub struct SolveArgs {
     settings: SolveSettings,
     #[command(flatten)]
     lattice: LatticeSettings,
+    /// Choose method and resolution so that the stated error, algebraic and discretisation, stays below this, as 3% or
+    /// 0.03; exit 1 where it cannot be met
+    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "coarsen", "lp", "boundary", "structure"])]
+    error: Option<f64>,
 }
 
 #[derive(Args)]
@@ -58,9 +62,6 @@ pub struct SolveSettings {
     /// Algebraic error allowed in the modulus, as 0.1% or 0.001 [default: 0.1%]
     #[arg(long, value_name = "ERROR", value_parser = words::fraction)]
     tolerance: Option<f64>,
-    /// Choose the resolution so that the whole error stays below this, as 3% or 0.03
-    #[arg(long, value_name = "ERROR", value_parser = words::fraction)]
-    error: Option<f64>,
     /// voxel-fe: split each voxel into N³ elements
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "coarsen")]
     refine: Option<u16>,
@@ -92,19 +93,14 @@ impl SolveSettings {
     }
 
     fn refuse_unavailable(&self) -> Result<()> {
-        for (flag, asked) in [
-            ("--error", self.error.is_some()),
-            ("--fields", !self.fields.is_empty()),
-        ] {
-            if asked {
-                return Err(Error::setting(
-                    flag,
-                    "not available in this version",
-                    "leave it out",
-                ));
-            }
+        match self.fields.is_empty() {
+            true => Ok(()),
+            false => Err(Error::setting(
+                "--fields",
+                "not available in this version",
+                "leave it out",
+            )),
         }
-        Ok(())
     }
 }
 
@@ -113,12 +109,23 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     args.settings.apply(&mut params)?;
     let mut lattice = bonepd_ct::run::lattice::settings(&args.dir)?;
     args.lattice.apply(&mut lattice)?;
-    let rows = bonepd_ct::run::solve::solve(&args.dir, &lattice, &params, session)?;
+    let (rows, met) = match args.error {
+        Some(target) => {
+            let found = bonepd_ct::run::adaptive::solve_to(&args.dir, target, &params, session)?;
+            (found.rows, found.met)
+        }
+        None => {
+            let rows = bonepd_ct::run::solve::solve(&args.dir, &lattice, &params, session)?;
+            (rows, true)
+        }
+    };
     if json {
         print_json(&rows);
     }
-    Ok(match rows.iter().any(|row| row.converged == Some(false)) {
-        true => Outcome::NotConverged,
-        false => Outcome::Done,
-    })
+    Ok(
+        match !met || rows.iter().any(|row| row.converged == Some(false)) {
+            true => Outcome::NotConverged,
+            false => Outcome::Done,
+        },
+    )
 }

@@ -1,6 +1,7 @@
 //! Numbers drawn from a mask or a solution, as plain records.
 
 pub mod apparent;
+pub mod extrapolate;
 pub mod ffb;
 pub mod morphometry;
 pub mod row;

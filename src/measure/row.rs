@@ -44,6 +44,8 @@ pub struct Row {
     pub discretization_error_mpa: Option<f64>,
     pub wall_s: Option<f64>,
     pub peak_mib: Option<f64>,
+    /// Quick estimate of the struts' thickness, 2 BV / BS.
+    pub mean_thickness_mm: Option<f64>,
     /// Relative algebraic error asked for in the headline.
     pub tolerance: Option<f64>,
     /// What a reader must know of this row (no path between the faces, not converged, ...).

@@ -1,5 +1,6 @@
 //! Recipes on real scans: each verb of the program is one function here, from paths and settings to files.
 
+pub mod adaptive;
 pub mod cohort;
 pub mod estimate;
 pub mod host;

@@ -4,6 +4,7 @@
 
 use crate::error::{Error, Result};
 use crate::io::{atomic, table};
+use crate::measure::extrapolate::with_extrapolated;
 use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
 use crate::run::host;
@@ -109,10 +110,10 @@ impl Results {
             .iter()
             .map(|keyed| keyed.row.clone())
             .collect();
-        let rows = with_ffb(&solved);
+        let rows = with_extrapolated(&with_ffb(&solved));
         let mut solved = self.record.rows.iter();
         let keyed = |row: &Row| match row.boundary.as_deref() {
-            Some("ffb") => KeyedRow {
+            Some("ffb" | "extrapolated") => KeyedRow {
                 row: row.clone(),
                 key: None,
                 settings: None,

@@ -2,8 +2,10 @@
 
 use crate::error::Result;
 use crate::io::specimen;
+use crate::measure::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapolated};
 use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
+use crate::measure::thickness::plate_thickness_mm;
 use crate::run::meter::Meter;
 use crate::run::results::Results;
 use crate::run::segment::load;
@@ -34,10 +36,15 @@ pub fn solve(
     if params.method == Method::Lattice {
         warn_of_coarse(dir, lattices, session);
     }
+    let mean_thickness_mm = plate_thickness_mm(&specimen.bone);
     let mut results = Results::open(dir, session.force)?;
     let mut rows = Vec::new();
     for job in jobs(lattices, params) {
-        let blank = job.label(&specimen, params, params.row(&specimen));
+        let settings = Row {
+            mean_thickness_mm,
+            ..params.row(&specimen)
+        };
+        let blank = job.label(&specimen, params, settings);
         let kept = results.find(&blank, params);
         let row =
             match kept.filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params)) {
@@ -56,7 +63,11 @@ pub fn solve(
         results.keep(&blank, params, &row)?;
         rows.push(row);
     }
-    Ok(with_ffb(&rows))
+    let all = with_extrapolated(&with_ffb(&rows));
+    for row in all.iter().filter(|row| is_extrapolated(row)) {
+        session.say(in_words(row));
+    }
+    Ok(all)
 }
 
 /// Struts thinner than two lattice parameters are one or two sites thick.
@@ -133,10 +144,12 @@ fn solve_job(
         Job::VoxelFe => voxel_fe::solve_voxels(specimen, params, observe)?,
     };
     bar.finish_and_clear();
+    let row = solved.row(blank.clone());
     Ok(Row {
         wall_s: Some(meter.wall_s()),
         peak_mib: meter.peak_mib(),
-        ..solved.row(blank.clone())
+        discretization_error_mpa: voxel_fe_error(&row),
+        ..row
     })
 }
 
@@ -158,17 +171,20 @@ fn show_load(bar: &ProgressBar, load: usize, step: CgStep, tolerance: f64) {
     }
 }
 
-fn in_words(row: &Row) -> String {
+pub(super) fn in_words(row: &Row) -> String {
     let number = |v: Option<f64>, digits: usize| v.map_or("NA".into(), |v| format!("{v:.digits$}"));
     let note = row
         .note
         .as_ref()
         .map_or(String::new(), |n| format!("  ({n})"));
+    let discretization = row
+        .discretization_error_mpa
+        .map_or(String::new(), |e| format!(" ± {e:.3} (discretisation)"));
     format!(
-        "{} {:<8} {:<7} {:>6} mm  E_app {:>9} MPa ± {:<7} {:>9} sites {:>6} iterations {:>7} s{note}",
+        "{} {:<8} {:<12} {:>6} mm  E_app {:>9} MPa ± {:<7}{discretization} {:>9} sites {:>6} iterations {:>7} s{note}",
         row.scan,
         row.structure,
-        row.boundary.as_deref().unwrap_or("NA"),
+        row.boundary.as_deref().unwrap_or(""),
         row.lp_mm,
         number(row.e_app_mpa, 3),
         number(row.algebraic_error_mpa, 3),

@@ -17,6 +17,12 @@ use std::path::Path;
 /// Lattice parameters tried, in strut thicknesses.
 const LP_OVER_THICKNESS: [f64; 3] = [1.0, 0.75, 0.5];
 
+/// The finer of each pair of voxel-FE solves: voxels per element, elements per voxel.
+const PAIRS: [(usize, usize); 4] = [(2, 1), (1, 1), (1, 2), (1, 4)];
+
+/// A pair is worth a try where its expected error is at most this many targets.
+const MARGIN: f64 = 1.2;
+
 /// Elements that a voxel-FE solve may have at most: some 8 GiB.
 const MOST_ELEMENTS: f64 = 2.5e7;
 
@@ -78,9 +84,13 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         }
     }
     let elements = bone.as_slice().iter().filter(|b| **b != 0).count() as f64;
-    for (coarsen, refine) in [(2, 1), (1, 1), (1, 2), (1, 4)] {
-        let element = voxel * coarsen as f64 / refine as f64;
-        if expected_of_pair(element, thickness) > 1.2 * target {
+    let size = |(coarsen, refine): (usize, usize)| voxel * coarsen as f64 / refine as f64;
+    let suffices = |pair| expected_of_pair(size(pair), thickness) <= MARGIN * target;
+    let any = PAIRS.into_iter().any(suffices);
+    for (coarsen, refine) in PAIRS {
+        let element = size((coarsen, refine));
+        // Where none can be expected to suffice, one element a voxel says how far one gets.
+        if !suffices((coarsen, refine)) && (any || (coarsen, refine) != (1, 1)) {
             continue;
         }
         if elements * (refine as f64).powi(3) > MOST_ELEMENTS {

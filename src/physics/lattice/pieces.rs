@@ -6,7 +6,7 @@
 
 use super::Moduli;
 use crate::operator::Operator;
-use crate::operator::coarsen::{Block, Coarsen};
+use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::topology::pieces::Pieces;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -210,18 +210,10 @@ impl Operator<3> for GradedSprings<'_> {
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        let row = |site: usize| {
-            let mut f = [0.0; 3];
-            for (end, d, spring) in self.springs(site) {
-                let along: f64 = (0..3).map(|c| d[c] * (x[site][c] - x[end][c])).sum();
-                (0..3).for_each(|c| f[c] += spring * along * d[c]);
-            }
-            f
-        };
-        y.par_iter_mut()
-            .with_min_len(PORTION)
-            .enumerate()
-            .for_each(|(site, y)| *y = row(site));
+        y.par_chunks_mut(PORTION).enumerate().for_each(|(c, y)| {
+            let first = c * PORTION;
+            self.rows_f64(first..first + y.len(), x, y);
+        });
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
@@ -235,21 +227,51 @@ impl Operator<3> for GradedSprings<'_> {
 }
 
 impl Coarsen for GradedSprings<'_> {
-    fn position(&self, site: usize) -> [f64; 3] {
-        let pieces = self.0.pieces;
-        pieces.frame.position_mm(pieces.indices[site])
+    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
+        let Pieces { frame, indices, .. } = self.0.pieces;
+        for (x, at) in x.iter_mut().zip(&indices[sites]) {
+            *x = frame.position_mm(*at);
+        }
     }
 
-    fn row(&self, site: usize, blocks: &mut Vec<(u32, Block)>) {
-        let mut own = [[0f32; 3]; 3];
-        for (end, d, spring) in self.springs(site) {
-            let block = d.map(|a| d.map(|b| (spring * a * b) as f32));
-            for (own, row) in own.iter_mut().zip(&block) {
-                (0..3).for_each(|b| own[b] += row[b]);
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
+        let (mut columns, mut blocks) = (Vec::with_capacity(19), Vec::with_capacity(19));
+        for site in sites {
+            let mut own = [[0f32; 3]; 3];
+            columns.clear();
+            blocks.clear();
+            for (end, d, spring) in self.springs(site) {
+                let block = d.map(|a| d.map(|b| (spring * a * b) as f32));
+                for (own, row) in own.iter_mut().zip(&block) {
+                    (0..3).for_each(|b| own[b] += row[b]);
+                }
+                columns.push(end as u32);
+                blocks.push(block.map(|r| r.map(|v| -v)));
             }
-            blocks.push((end as u32, block.map(|r| r.map(|v| -v))));
+            columns.push(site as u32);
+            blocks.push(own);
+            visit(site, &columns, &blocks);
         }
-        blocks.push((site as u32, own));
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        let mut reach = sites.clone();
+        for (end, ..) in sites.flat_map(|site| self.springs(site)) {
+            reach.start = reach.start.min(end);
+            reach.end = reach.end.max(end + 1);
+        }
+        reach
+    }
+
+    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        for (site, y) in sites.zip(y) {
+            let mut f = [0.0; 3];
+            for (end, d, spring) in self.springs(site) {
+                let along: f64 = (0..3).map(|c| d[c] * (x[site][c] - x[end][c])).sum();
+                (0..3).for_each(|c| f[c] += spring * along * d[c]);
+            }
+            *y = f;
+        }
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
@@ -262,5 +284,10 @@ impl Coarsen for GradedSprings<'_> {
             }
             *y = f;
         }
+    }
+
+    /// Of one spring, `(u_i − u_j)² <= 2 u_i² + 2 u_j²`.
+    fn eigenvalue_bound(&self) -> f64 {
+        2.0
     }
 }

@@ -243,3 +243,142 @@ fn images_and_slices_are_geometries() {
         .success();
     assert!((last(&out, "min") + 0.5).abs() < 0.01);
 }
+
+/// Runs a scene text in a folder of its own; the exit code, what was said, and the results.
+fn run_text(text: &str) -> (i32, String, tempfile::TempDir) {
+    let dir = tempfile::tempdir().unwrap();
+    let grey = image::GrayImage::from_fn(12, 14, |_, y| {
+        image::Luma([if y == 6 || y == 7 { 0 } else { 255 }])
+    });
+    grey.save(dir.path().join("pieces.png")).unwrap();
+    let scene = dir.path().join("scene.toml");
+    std::fs::write(&scene, text).unwrap();
+    let run = bonepd()
+        .arg("scene")
+        .arg(&scene)
+        .arg("-o")
+        .arg(dir.path().join("out"))
+        .output()
+        .unwrap();
+    let words = String::from_utf8_lossy(&run.stderr).into_owned();
+    (run.status.code().unwrap(), words, dir)
+}
+
+/// Through the program: what cannot work exits with 2 and says what to do.
+#[test]
+fn scenes_that_cannot_work_are_refused() {
+    let growth = "growth = { rate = 1.0, stimulus = 0.01 }";
+    let physics = |more: &str| format!("[physics.bond-based]\nyoung = 100.0\n{more}\n");
+    let disc = "geometry.disc.radius = 6.0\n";
+    let held = |text: String| {
+        let (start, end) = (text.find("[[hold]]").unwrap(), text.find("[time]").unwrap());
+        format!("{}{}", &text[..start], &text[end..])
+    };
+    let whole = format!("{disc}{BODY}{}", physics(growth));
+    let in_pieces = whole.replace("keep_largest = true", "");
+    let in_pieces = in_pieces.replace(disc, "geometry.image.file = 'pieces.png'\n");
+    let same = format!(
+        "{disc}{BODY}{}",
+        physics(
+            "density = { exponent = 3.0 }\ngrowth = { rate = 1.0, stimulus = 0.01, exponent = 3.0 }",
+        )
+    );
+    let cases = [
+        (in_pieces, "2 unconnected pieces"),
+        (held(whole.clone()), "nothing holds the body along x"),
+        (same, "n = 3 is not below m = 3"),
+        (
+            whole.replace("stimulus", "stimulos"),
+            "did you mean `stimulus`",
+        ),
+    ];
+    for (text, expected) in cases {
+        let (code, words, dir) = run_text(&text);
+        assert_eq!(code, 2, "{words}");
+        let line = words.replace('\n', " ");
+        assert!(line.contains(expected), "{words}");
+        assert!(!dir.path().join("out/scene.json").exists());
+    }
+}
+
+/// With a least density the same body fades to it and the scene goes on to its end.
+#[test]
+fn a_least_density_stops_resorption() {
+    for model in ["bond-based", "continuum"] {
+        for more in ["", "solver.method = 'reuse'\n"] {
+            let text = format!(
+                "geometry.disc.radius = 6.0\n{}\n[physics.{model}]\nyoung = 100.0\n{more}\
+                 growth = {{ rate = 1.0, stimulus = 0.3, least = 0.2 }}\n",
+                BODY.replace("values = [0.0, -0.1]", "values = [0.0, 0.0]")
+            );
+            let (code, words, dir) = run_text(&text);
+            assert_eq!(code, 0, "{words}");
+            let out = dir.path().join("out");
+            assert!((last(&out, "max") + 0.8).abs() < 1e-6);
+            assert!((last(&out, "min") + 0.8).abs() < 1e-6);
+        }
+    }
+}
+
+/// The example scene of a scan's slice, on a sample scan that was segmented as its first lines say.
+#[test]
+fn a_slice_of_a_segmented_scan_remodels() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let sample = root.join("sample_data/dense.nii.gz");
+    bonepd()
+        .arg("segment")
+        .arg(&sample)
+        .arg("-o")
+        .arg(dir.path().join("out/dense"))
+        .args(["--lower", "200", "--upper", "5600"])
+        .assert()
+        .success();
+    let text = std::fs::read_to_string(pipelines().join("scan-slice.toml")).unwrap();
+    assert!(text.contains(
+        "bonepd-ct segment sample_data/dense.nii.gz -o out/dense --lower 200 --upper 5600"
+    ));
+    let text = text
+        .replace("../out", "out")
+        .replace("../sample_data", "sample_data");
+    std::fs::create_dir(dir.path().join("sample_data")).unwrap();
+    std::fs::copy(&sample, dir.path().join("sample_data/dense.nii.gz")).unwrap();
+    let scene = dir.path().join("scan-slice.toml");
+    std::fs::write(&scene, text).unwrap();
+    let out = dir.path().join("scene");
+    bonepd()
+        .arg("scene")
+        .arg(&scene)
+        .arg("-o")
+        .arg(&out)
+        .assert()
+        .success();
+    // Some bone is resorbed to the least density, some is laid down.
+    assert!((last(&out, "min") + 0.95).abs() < 1e-6);
+    assert!(last(&out, "max") > 0.1);
+}
+
+/// Nothing loads the body: densities fall until none is left. The program stops, says so, and keeps the last state.
+#[test]
+fn a_density_that_would_go_negative_stops_the_scene() {
+    for model in ["bond-based", "continuum"] {
+        let text = format!(
+            "geometry.disc.radius = 6.0\n{}\n[physics.{model}]\nyoung = 100.0\n\
+             growth = {{ rate = 1.0, stimulus = 0.3 }}\n",
+            BODY.replace("values = [0.0, -0.1]", "values = [0.0, 0.0]")
+                .replace("step = 0.5", "step = 0.5\nsmallest_share = 0.25")
+        );
+        let (code, words, dir) = run_text(&text);
+        assert_eq!(code, 1, "{words}");
+        let out = dir.path().join("out");
+        let record = std::fs::read_to_string(out.join("scene.json")).unwrap();
+        assert!(record.contains("a density would go negative"), "{record}");
+        assert!(
+            record.contains("the last good state is written"),
+            "{record}"
+        );
+        // From 1 at 0.3 a unit of time: 3.25 is the last time a quarter of a step can reach.
+        assert!(out.join("fields_t3.25.csv").exists());
+        assert!((last(&out, "max") + 0.975).abs() < 1e-6);
+    }
+}

@@ -40,6 +40,16 @@ impl Rows<'_> {
             .expect("an entry of the pattern");
         self.value[a - base + place] += value;
     }
+
+    /// Moves a row's entries out of a dense row, leaving zeros.
+    fn take(&mut self, row: usize, dense: &mut [f64]) {
+        let base = self.start[self.rows.start] as usize;
+        let range = self.start[row] as usize..self.start[row + 1] as usize;
+        for k in range {
+            let column = self.column[k] as usize;
+            self.value[k - base] = std::mem::take(&mut dense[column]);
+        }
+    }
 }
 
 impl Sparse {
@@ -102,6 +112,19 @@ impl Sparse {
         });
     }
 
+    /// Sets all values anew, a row at a time: `gather(row, dense)` adds the row's entries to a dense row of zeros. For
+    /// rows with many entries each added to several times; entries outside the pattern are not allowed.
+    pub fn fill_rows(&mut self, gather: impl Fn(usize, &mut [f64]) + Sync) {
+        let n = self.n();
+        self.fill(|rows| {
+            let mut dense = vec![0.0; n];
+            for row in rows.range() {
+                gather(row, &mut dense);
+                rows.take(row, &mut dense);
+            }
+        });
+    }
+
     /// `y = A x`.
     pub fn apply(&self, x: &[f64], y: &mut [f64]) {
         y.par_chunks_mut(BLOCK).enumerate().for_each(|(block, y)| {
@@ -141,5 +164,11 @@ mod tests {
         a.apply(&vec![1.0; n], &mut y);
         assert!((0..n).all(|i| y[i] == 1.0 + i as f64));
         assert_eq!(a.max(), 1001.0);
+        let before = a.value.clone();
+        a.fill_rows(|i, dense| {
+            dense[i] += 2.0 + i as f64;
+            dense[(i + 1) % n] -= 1.0;
+        });
+        assert_eq!(a.value, before);
     }
 }

@@ -12,6 +12,9 @@ use crate::physics::hyperelastic::{Energy, Plane};
 use crate::topology::plane::Points;
 use rayon::prelude::*;
 
+/// Relative densities below this are none at all.
+const VANISHED: f64 = 1e-12;
+
 /// Equations of an element: four densities, then four placements.
 const N: usize = 12;
 type Row = [f64; N];
@@ -183,7 +186,8 @@ impl Continuum {
     }
 
     /// The density at a Gauss point after a step at the given (unweighted) energy. The balance falls with density where
-    /// n < m, so its root is unique: Newton kept inside a shrinking bracket.
+    /// n < m, so its root is unique: Newton kept inside a shrinking bracket. No number where none is left: without
+    /// energy, the root would be negative.
     fn settle(&self, old: f64, energy: f64, dt: f64) -> f64 {
         let Some(growth) = &self.growth else {
             return old;
@@ -207,6 +211,9 @@ impl Continuum {
                 return newton;
             }
             let inside = low < newton && newton < high;
+            if high < VANISHED * self.weight.reference {
+                break;
+            }
             rho = if inside {
                 newton
             } else if high.is_finite() {
@@ -215,7 +222,7 @@ impl Continuum {
                 2.0 * rho
             };
         }
-        rho
+        f64::NAN
     }
 
     /// Densities at the Gauss points after a step.
@@ -431,6 +438,9 @@ impl Staggered for Step<'_> {
 
     /// Of the lumped balance: the sum of each row among densities, which the consistent one tends to.
     fn local_diagonal(&self, q: &[f64], diagonal: &mut [f64]) {
+        if diagonal.is_empty() {
+            return;
+        }
         let values = self.expand(q);
         let rows: Vec<[f64; 4]> = (0..self.model.elements.len())
             .into_par_iter()

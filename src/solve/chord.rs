@@ -1,19 +1,30 @@
 //! Owns the chord method for weakly coupled equations: local unknowns one by one, the others with a Cholesky factor kept
-//! from step to step and renewed only when convergence slows. It stops at the residual of the whole system, so what it
-//! finds is what Newton's method finds.
+//! from step to step and renewed only when convergence slows, both accelerated together. It stops at the residual of the
+//! whole system, so what it finds is what Newton's method finds.
 
 use crate::error::Result;
 use crate::operator::nonlinear::Staggered;
 use crate::operator::sparse::Sparse;
+use crate::solve::anderson::Anderson;
 use crate::solve::direct::DirectLlt;
 use crate::solve::newton::NotConverged;
+use crate::solve::rough::RoughLlt;
 
 pub struct Chord {
     stiffness: Sparse,
-    llt: DirectLlt,
+    order: Vec<usize>,
+    factor: Factor,
     ready: bool,
+    /// Iterations since the factor was made.
+    age: usize,
     pub tolerance: f64,
     pub max_iterations: usize,
+}
+
+/// Single precision, until a matrix proves too ill-conditioned for it.
+enum Factor {
+    Single(Box<RoughLlt>),
+    Double(Box<DirectLlt>),
 }
 
 /// What a solve took.
@@ -24,22 +35,30 @@ pub struct Chorded {
     pub error: f64,
 }
 
-/// An iteration that leaves more than this share of the error calls for a new factor; measured best between 0.2 and 0.4
-/// on the femur scenes.
-const SLOW: f64 = 0.3;
+/// A solve that takes more iterations than this calls for a new factor ...
+const PATIENCE: usize = 10;
+/// ... unless the factor has served fewer iterations than this: one factor costs as much as 20 (short horizons) to 60
+/// (wide ones) iterations on the femur scenes.
+const WORTH: usize = 50;
+/// An error this many times that before calls for a new factor at once.
+const DIVERGING: f64 = 3.0;
+/// No accelerated update takes more than this share of a local unknown.
+const LOSS: f64 = 0.7;
 
 impl Chord {
     /// `pattern` and `order` are those of the unknowns that are not local.
     pub fn new(
         pattern: Sparse,
-        order: &[usize],
+        order: Vec<usize>,
         tolerance: f64,
         max_iterations: usize,
     ) -> Result<Self> {
         Ok(Chord {
-            llt: DirectLlt::new(&pattern, order)?,
+            factor: Factor::Single(Box::new(RoughLlt::new(&pattern, &order)?)),
             stiffness: pattern,
+            order,
             ready: false,
+            age: 0,
             tolerance,
             max_iterations,
         })
@@ -54,13 +73,14 @@ impl Chord {
         let local = equations.local();
         let mut r = vec![0.0; q.len()];
         let mut diagonal = vec![0.0; local];
+        let mut anderson = Anderson::default();
         let mut done = Chorded {
             iterations: 0,
             factorisations: 0,
             error: f64::INFINITY,
         };
+        let mut cut = false;
         equations.local_diagonal(q, &mut diagonal);
-        let mut fresh = false;
         loop {
             equations.residual(q, &mut r);
             let before = std::mem::replace(&mut done.error, equations.error(&r));
@@ -70,18 +90,32 @@ impl Chord {
             if done.iterations >= self.max_iterations || !done.error.is_finite() {
                 // The factor may be what is wrong: the next attempt starts with a new one.
                 self.ready = false;
-                return Err(NotConverged::Diverged { error: done.error });
+                return Err(NotConverged::after(done.error, cut));
             }
-            if !self.ready || (done.error > SLOW * before && !fresh) {
+            if self.is_stale(&done, before) {
                 self.renew(equations, q)?;
                 done.factorisations += 1;
-                fresh = true;
-            } else {
-                fresh = false;
+                anderson.restart();
             }
-            self.update(equations, q, &mut r, &diagonal);
+            let (update, share) = self.update(equations, q, &mut r, &diagonal);
+            cut = share < 1.0;
+            let next = anderson.next(q, &update, local);
+            let admissible = (0..local).all(|k| next[k] > (1.0 - LOSS) * q[k]);
+            if admissible {
+                q.copy_from_slice(&next);
+            } else {
+                anderson.restart();
+                q.iter_mut().zip(&update).for_each(|(q, dq)| *q += dq);
+            }
             done.iterations += 1;
+            self.age += 1;
         }
+    }
+
+    fn is_stale(&self, done: &Chorded, before: f64) -> bool {
+        let slow = done.iterations > 0 && done.iterations.is_multiple_of(PATIENCE);
+        let grows = done.error > DIVERGING * before;
+        !self.ready || (self.age >= WORTH && slow) || (self.age >= PATIENCE && grows)
     }
 
     /// The response of the unknowns that are not local to the residual `r`, at `q`, in place; local ones stay.
@@ -96,40 +130,62 @@ impl Chord {
         }
         let (local, placements) = r.split_at_mut(equations.local());
         local.fill(0.0);
-        self.llt.solve(placements);
+        self.factor.solve(placements);
         Ok(())
     }
 
     fn renew(&mut self, equations: &impl Staggered, q: &[f64]) -> Result<(), NotConverged> {
         equations.stiffness(q, &mut self.stiffness);
-        let factor = self.llt.factorize(&self.stiffness);
-        self.ready = factor.is_ok();
-        factor.map_err(|_| NotConverged::Singular)
+        self.age = 0;
+        let mut made = self.factor.factorize(&self.stiffness);
+        if made.is_err() && matches!(self.factor, Factor::Single(_)) {
+            let double = DirectLlt::new(&self.stiffness, &self.order);
+            self.factor = Factor::Double(Box::new(double.map_err(|_| NotConverged::Singular)?));
+            made = self.factor.factorize(&self.stiffness);
+        }
+        self.ready = made.is_ok();
+        made.map_err(|_| NotConverged::Singular)
     }
 
-    /// Local unknowns first, then the others with the residual those leave.
+    /// Local unknowns first, then the others with the residual those leave; and the share of the former that is
+    /// admissible.
     fn update(
         &mut self,
         equations: &impl Staggered,
-        q: &mut [f64],
+        q: &[f64],
         r: &mut [f64],
         diagonal: &[f64],
-    ) {
+    ) -> (Vec<f64>, f64) {
         let local = diagonal.len();
+        let mut share = 1.0;
         let mut dq = vec![0.0; q.len()];
         for k in 0..local {
             dq[k] = -r[k] / diagonal[k];
         }
         if local > 0 {
-            let share = equations.share(q, &dq);
-            q.iter_mut().zip(&dq).for_each(|(q, dq)| *q += share * dq);
-            equations.residual(q, r);
+            share = equations.share(q, &dq);
+            dq.iter_mut().for_each(|dq| *dq *= share);
+            let moved: Vec<f64> = q.iter().zip(&dq).map(|(q, dq)| q + dq).collect();
+            equations.residual(&moved, r);
         }
-        let (_, placements) = r.split_at_mut(local);
-        self.llt.solve(placements);
-        q[local..]
-            .iter_mut()
-            .zip(placements)
-            .for_each(|(q, dq)| *q += *dq);
+        dq[local..].copy_from_slice(&r[local..]);
+        self.factor.solve(&mut dq[local..]);
+        (dq, share)
+    }
+}
+
+impl Factor {
+    fn factorize(&mut self, a: &Sparse) -> Result<()> {
+        match self {
+            Factor::Single(llt) => llt.factorize(a),
+            Factor::Double(llt) => llt.factorize(a),
+        }
+    }
+
+    fn solve(&mut self, x: &mut [f64]) {
+        match self {
+            Factor::Single(llt) => llt.solve(x),
+            Factor::Double(llt) => llt.solve(x),
+        }
     }
 }

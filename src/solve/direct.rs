@@ -12,6 +12,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::traits::RealField;
 use faer::{Conj, MatMut, Par, Side};
 
 /// `LU` of an unsymmetric matrix, columns ordered by COLAMD.
@@ -64,19 +65,7 @@ impl DirectLlt {
     /// `order[k]` is the row eliminated `k`-th, for instance from
     /// [`nested_dissection`](crate::topology::dissection::nested_dissection).
     pub fn new(a: &Sparse, order: &[usize]) -> Result<Self> {
-        let forward: Vec<u32> = order.iter().map(|&i| i as u32).collect();
-        let mut inverse = vec![0; forward.len()];
-        forward
-            .iter()
-            .enumerate()
-            .for_each(|(k, &i)| inverse[i as usize] = k as u32);
-        let symbolic = factorize_symbolic_cholesky(
-            pattern(a),
-            Side::Upper,
-            SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, a.n())),
-            CholeskySymbolicParams::default(),
-        )
-        .map_err(|e| failed("Cholesky", format!("{e:?}")))?;
+        let symbolic = symbolic_cholesky(a, order)?;
         let scratch = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
         Ok(DirectLlt {
             symbolic,
@@ -92,22 +81,7 @@ impl DirectLlt {
 
     /// Refuses a matrix that is not positive definite.
     pub fn factorize(&mut self, a: &Sparse) -> Result<()> {
-        self.numeric.resize(self.symbolic.len_val(), 0.0);
-        let scratch = self
-            .symbolic
-            .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        self.symbolic
-            .factorize_numeric_llt(
-                &mut self.numeric,
-                SparseColMatRef::new(pattern(a), &a.value[..]),
-                Side::Upper,
-                Default::default(),
-                Par::Seq,
-                MemStack::new(&mut MemBuffer::new(scratch)),
-                Default::default(),
-            )
-            .map_err(|_| failed("Cholesky", "the stiffness is not positive definite".into()))?;
-        Ok(())
+        numeric_cholesky(&self.symbolic, a, &a.value, &mut self.numeric)
     }
 
     /// The factor's lower right corner: the Cholesky factor of the Schur complement of the `count` rows eliminated
@@ -163,6 +137,46 @@ impl DirectLlt {
             MemStack::new(&mut self.solve_scratch),
         );
     }
+}
+
+/// Symbolic part of a Cholesky factorisation in the given elimination order.
+pub(super) fn symbolic_cholesky(a: &Sparse, order: &[usize]) -> Result<SymbolicCholesky<u32>> {
+    let forward: Vec<u32> = order.iter().map(|&i| i as u32).collect();
+    let mut inverse = vec![0; forward.len()];
+    forward
+        .iter()
+        .enumerate()
+        .for_each(|(k, &i)| inverse[i as usize] = k as u32);
+    factorize_symbolic_cholesky(
+        pattern(a),
+        Side::Upper,
+        SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, a.n())),
+        CholeskySymbolicParams::default(),
+    )
+    .map_err(|e| failed("Cholesky", format!("{e:?}")))
+}
+
+/// Numeric part in the precision of `value`, the values of `a`'s pattern.
+pub(super) fn numeric_cholesky<T: RealField>(
+    symbolic: &SymbolicCholesky<u32>,
+    a: &Sparse,
+    value: &[T],
+    numeric: &mut Vec<T>,
+) -> Result<()> {
+    numeric.resize(symbolic.len_val(), T::zero_impl());
+    let scratch = symbolic.factorize_numeric_llt_scratch::<T>(Par::Seq, Default::default());
+    symbolic
+        .factorize_numeric_llt(
+            numeric,
+            SparseColMatRef::new(pattern(a), value),
+            Side::Upper,
+            Default::default(),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+            Default::default(),
+        )
+        .map_err(|_| failed("Cholesky", "the stiffness is not positive definite".into()))?;
+    Ok(())
 }
 
 fn pattern(a: &Sparse) -> SymbolicSparseColMatRef<'_, u32> {

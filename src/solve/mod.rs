@@ -1,6 +1,7 @@
 //! Algorithms that see an operator, never the physics behind it.
 
 pub mod amg;
+pub mod anderson;
 pub mod cg;
 pub mod chord;
 pub mod direct;
@@ -10,4 +11,5 @@ pub mod jacobi;
 pub mod lanczos;
 pub mod mixed;
 pub mod newton;
+pub mod rough;
 pub mod zone;

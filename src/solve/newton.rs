@@ -26,8 +26,24 @@ pub enum NotConverged {
     /// Too many iterations, or a residual that is no number.
     #[error("the iterations did not converge (residual {error:.1e})")]
     Diverged { error: f64 },
+    /// The last update had to be cut to stay admissible, or left no number.
+    #[error(
+        "a density would go negative: bone is resorbed faster than its load sustains (set \
+         growth.least, raise the load, lower growth.stimulus, or end sooner)"
+    )]
+    Vanishing,
     #[error("the tangent is singular or not positive definite")]
     Singular,
+}
+
+impl NotConverged {
+    /// Of iterations whose last update was `cut` to stay admissible, or not.
+    pub fn after(error: f64, cut: bool) -> Self {
+        match cut || !error.is_finite() {
+            true => NotConverged::Vanishing,
+            false => NotConverged::Diverged { error },
+        }
+    }
 }
 
 impl Newton {
@@ -48,6 +64,7 @@ impl Newton {
     ) -> Result<Converged, NotConverged> {
         let mut r = vec![0.0; q.len()];
         let mut errors = Vec::new();
+        let mut cut = false;
         loop {
             equations.residual(q, &mut r);
             let error = equations.error(&r);
@@ -56,7 +73,7 @@ impl Newton {
                 return Ok(Converged { errors });
             }
             if errors.len() > self.max_iterations || !error.is_finite() {
-                return Err(NotConverged::Diverged { error });
+                return Err(NotConverged::after(error, cut));
             }
             equations.tangent(q, &mut self.tangent);
             let factor = self.lu.factorize(&self.tangent);
@@ -64,6 +81,7 @@ impl Newton {
             r.iter_mut().for_each(|v| *v = -*v);
             self.lu.solve(&mut r);
             let share = equations.share(q, &r);
+            cut = share < 1.0;
             q.iter_mut().zip(&r).for_each(|(q, dq)| *q += share * dq);
         }
     }

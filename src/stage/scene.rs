@@ -9,6 +9,7 @@ pub mod density;
 pub mod frame;
 mod march;
 pub mod solver;
+mod stride;
 
 use crate::error::{Error, Result};
 use crate::topology::family::Stencil;

@@ -182,6 +182,13 @@ impl Body {
         given
     }
 
+    /// Times at which what is given jumps or bends.
+    pub fn corners(&self) -> Vec<f64> {
+        let layers = self.layers.iter().flat_map(|l| l.displacement.corners());
+        let holds = self.holds.iter().flat_map(|h| h.value.corners());
+        layers.chain(holds).copied().collect()
+    }
+
     /// Centre and size of the material along an axis.
     fn extent(&self, axis: usize) -> (f64, f64) {
         let cells = (0..self.material).map(|p| self.points.cell(p)[axis]);

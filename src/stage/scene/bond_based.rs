@@ -1,7 +1,9 @@
 //! Owns scenes of bond-based peridynamics, with or without growth.
 
 use crate::error::{Error, Result};
-use crate::physics::bond_based::{BondBased, Step, micromodulus_continuous, micromodulus_discrete};
+use crate::physics::bond_based::{
+    BondBased, Material, Step, micromodulus_continuous, micromodulus_discrete,
+};
 use crate::physics::growth::Weight;
 use crate::solve::newton::NotConverged;
 use crate::stage::scene::body::{Body, Conditions, NUDGE, nudge, rate_of};
@@ -10,7 +12,6 @@ use crate::stage::scene::frame::{Frame, Observer, Summary};
 use crate::stage::scene::march::{Advance, Marching, march};
 use crate::stage::scene::solver::{Equilibrium, SolverParams};
 use crate::stage::scene::{Inputs, Scene};
-use crate::topology::family::Family;
 use serde::{Deserialize, Serialize};
 
 /// `[physics.bond-based]`
@@ -111,19 +112,16 @@ impl Peridynamic {
             }
             None => Probes::new(&scene.probe, &material)?,
         };
-        let micromodulus = params.micromodulus.value(params.young, &stencil)?;
-        let model = BondBased {
-            micromodulus,
+        let substance = Material {
+            micromodulus: params.micromodulus.value(params.young, &stencil)?,
             young: params.young,
             weight: Weight {
                 reference: params.density.reference,
                 exponent: params.density.exponent,
             },
             growth,
-            shares,
-            points: body.points.len(),
-            family: Family::new(&body.points, body.material, stencil),
         };
+        let model = BondBased::new(&body.points, body.material, stencil, substance, shares);
         let local = body.map.unknowns_before(body.points.len());
         let positions = body.unknown_positions(local);
         let solver = Equilibrium::new(
@@ -190,12 +188,18 @@ impl Marching for Peridynamic {
         Ok(advance)
     }
 
-    fn frame(&self, t: f64, with_fields: bool) -> Frame {
+    fn corners(&self) -> Vec<f64> {
+        self.body.corners()
+    }
+
+    fn densities(&self) -> Vec<f64> {
         let relative = |rho: &f64| (rho - self.reference) / self.reference;
-        let change = self.values[..self.body.material]
-            .iter()
-            .map(relative)
-            .collect();
+        let densities = &self.values[..self.body.material];
+        densities.iter().map(relative).collect()
+    }
+
+    fn frame(&self, t: f64, with_fields: bool) -> Frame {
+        let change = self.densities();
         self.probes
             .frame(t, &self.body, &self.values, change, with_fields)
     }

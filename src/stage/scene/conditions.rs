@@ -223,6 +223,11 @@ pub enum LayerDensity {
 pub struct Time {
     pub end: f64,
     pub step: f64,
+    /// Let steps grow: each is a whole number of `step`s, such that the error an implicit Euler step adds to the
+    /// relative densities (root mean square) stays near this. Steps still end on all times of outputs and of corners in
+    /// holds and loads, and start anew after the latter. Absent: all steps are `step`.
+    #[serde(default)]
+    pub tolerance: Option<f64>,
     /// A step that fails is halved down to this share of `step`, and grown back after four that succeed.
     #[serde(default = "smallest_share")]
     pub smallest_share: f64,
@@ -235,13 +240,21 @@ fn smallest_share() -> f64 {
 impl Time {
     pub fn check(&self) -> Result<()> {
         let positive = self.end > 0.0 && self.step > 0.0 && self.step <= self.end;
-        if positive && self.end.is_finite() && (1e-12..=1.0).contains(&self.smallest_share) {
+        let usable = self.tolerance.is_none_or(|t| t.is_finite() && t > 0.0);
+        if positive
+            && usable
+            && self.end.is_finite()
+            && (1e-12..=1.0).contains(&self.smallest_share)
+        {
             return Ok(());
         }
         Err(Error::setting(
             "time",
-            format!("found end = {}, step = {}", self.end, self.step),
-            "both must be positive and step not above end; smallest_share is between 1e-12 and 1",
+            format!(
+                "found end = {}, step = {}, tolerance = {:?}",
+                self.end, self.step, self.tolerance
+            ),
+            "all must be positive and step not above end; smallest_share is between 1e-12 and 1",
         ))
     }
 }

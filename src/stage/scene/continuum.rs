@@ -205,7 +205,7 @@ impl Local {
     }
 
     /// Densities at the nodes: of Gauss densities, the mean of the nearest in each element around.
-    fn densities(&self) -> Vec<f64> {
+    fn at_nodes(&self) -> Vec<f64> {
         // Gauss point nearest to each corner: they are numbered along x first, corners go round.
         const NEAREST: [usize; 4] = [0, 1, 3, 2];
         match &self.old {
@@ -307,13 +307,21 @@ impl Marching for Local {
         Ok(advance)
     }
 
-    fn frame(&self, t: f64, with_fields: bool) -> Frame {
+    fn corners(&self) -> Vec<f64> {
+        let loads = self.loads.0.iter().flat_map(|(s, _)| s.corners()).copied();
+        self.body.corners().into_iter().chain(loads).collect()
+    }
+
+    fn densities(&self) -> Vec<f64> {
         let reference = self.model.weight.reference;
-        let change: Vec<f64> = self
-            .densities()
+        self.at_nodes()
             .iter()
             .map(|rho| (rho - reference) / reference)
-            .collect();
+            .collect()
+    }
+
+    fn frame(&self, t: f64, with_fields: bool) -> Frame {
+        let change = self.densities();
         self.probes
             .frame(t, &self.body, &self.values, change, with_fields)
     }

@@ -64,6 +64,9 @@ pub struct GrowthParams {
     /// `m`; must exceed the density exponent `n`.
     #[serde(default = "three")]
     pub exponent: f64,
+    /// Least relative density: there, resorption stops. Absent: bone that nothing loads fades until the scene stops.
+    #[serde(default)]
+    pub least: Option<f64>,
 }
 
 fn three() -> f64 {
@@ -95,11 +98,21 @@ impl GrowthParams {
                 ));
             }
         }
+        if self.least.is_some_and(|l| !(1e-6..1.0).contains(&l)) {
+            return Err(Error::setting(
+                "growth.least",
+                format!("found {:?}", self.least),
+                "give a relative density from 1e-6 to below 1, or leave it out",
+            ));
+        }
         Ok(Growth {
             reference: density.reference,
             rate: self.rate,
             stimulus: self.stimulus,
             exponent: m,
+            floor: self
+                .least
+                .map_or(f64::NEG_INFINITY, |l| l * density.reference),
         })
     }
 }

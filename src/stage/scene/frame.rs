@@ -33,6 +33,14 @@ impl Output {
             |every: f64| ((now + slack) / every).floor() > ((before + slack) / every).floor();
         self.times.iter().any(|&t| passed(t)) || self.every.is_some_and(multiple)
     }
+
+    /// The next time after `now` at which fields are due.
+    pub fn next_due(&self, now: f64) -> Option<f64> {
+        let slack = 1e-9 * now.abs().max(1e-300);
+        let multiple = self.every.map(|e| (((now + slack) / e).floor() + 1.0) * e);
+        let listed = self.times.iter().copied().filter(|t| *t > now + slack);
+        listed.chain(multiple).min_by(f64::total_cmp)
+    }
 }
 
 /// An accepted state.
@@ -99,5 +107,8 @@ mod tests {
             .filter(|&k| output.due(step(k - 1), step(k)))
             .collect();
         assert_eq!(due, [3, 10, 20]);
+        assert_eq!(output.next_due(0.1), Some(0.25));
+        assert_eq!(output.next_due(0.25), Some(1.0));
+        assert_eq!(output.next_due(1.0), Some(2.0));
     }
 }

@@ -4,11 +4,16 @@ use crate::error::{Error, Result};
 use crate::solve::newton::NotConverged;
 use crate::stage::scene::conditions::Time;
 use crate::stage::scene::frame::{Frame, Observer, Output, Summary};
+use crate::stage::scene::stride::Stride;
 
 /// A model that can be advanced one step.
 pub trait Marching {
     /// Tries to step from `before` to `now`; on failure the state is unchanged.
     fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged>;
+    /// Times at which supports or loads jump or bend.
+    fn corners(&self) -> Vec<f64>;
+    /// Relative densities, as far as they change.
+    fn densities(&self) -> Vec<f64>;
     /// The current state at time `t`.
     fn frame(&self, t: f64, with_fields: bool) -> Frame;
 }
@@ -53,14 +58,24 @@ pub fn march(
         (ticks / whole) as f64 * time.step + time.step * (ticks % whole) as f64 / whole as f64
     };
     let (mut ticks, mut level, mut streak) = (0, 0, 0);
+    let mut stride = Stride::new(time, model.corners());
+    let mut densities = model.densities();
     let mut worst: f64 = 0.0;
     let (mut iterations, mut factorisations) = (0, 0);
     observer.frame(&model.frame(0.0, true))?;
     while ticks < steps * whole {
-        let (before, now) = (at(ticks), at(ticks + (whole >> level)));
+        let length = match level {
+            0 if ticks % whole == 0 => stride.next(ticks / whole, steps, output) * whole,
+            _ => whole >> level,
+        };
+        let (before, now) = (at(ticks), at(ticks + length));
         match model.advance(before, now) {
             Ok(advance) => {
-                ticks += whole >> level;
+                ticks += length;
+                if stride.is_adaptive() {
+                    let old = std::mem::replace(&mut densities, model.densities());
+                    stride.accepted(now, now - before, &old, &densities);
+                }
                 streak += 1;
                 summary.steps += 1;
                 iterations += advance.iterations;
@@ -76,6 +91,10 @@ pub fn march(
                         time.step / (1u64 << level) as f64
                     ));
                 }
+            }
+            Err(why) if length > whole => {
+                stride.failed();
+                observer.say(&format!("t = {now:.6}: {why}; a shorter step is tried"));
             }
             Err(why) if level < finest => {
                 level += 1;

@@ -70,7 +70,7 @@ impl Equilibrium {
             Method::Newton => Equilibrium::Newton(Box::new(Newton::new(whole(), tolerance, most)?)),
             Method::Reuse => {
                 let order = nested_dissection(positions, reach);
-                Equilibrium::Chord(Box::new(Chord::new(placements(), &order, tolerance, most)?))
+                Equilibrium::Chord(Box::new(Chord::new(placements(), order, tolerance, most)?))
             }
         })
     }

@@ -5,12 +5,16 @@
 //! Values are numbered densities first (point `p`), then placements (`points + 2p + axis`). Only material points have
 //! equations; fictitious ones follow or are held.
 
+mod kernel;
+
 use crate::operator::nonlinear::{Nonlinear, Staggered};
 use crate::operator::reduction::Reduction;
-use crate::operator::sparse::{Rows, Sparse};
+use crate::operator::sparse::Sparse;
 use crate::physics::growth::{Growth, Weight};
 use crate::topology::family::{Bond, Family, Stencil};
-use rayon::prelude::*;
+use crate::topology::plane::Points;
+use kernel::Padded;
+pub use kernel::PointState;
 
 /// Bonds, their stiffness and their density law. Unit thickness.
 #[derive(Debug, Clone)]
@@ -27,6 +31,16 @@ pub struct BondBased {
     pub shares: Option<Vec<f64>>,
     /// Points in all, fictitious ones included.
     pub points: usize,
+    padded: Padded,
+}
+
+/// What bonds are made of.
+#[derive(Debug, Clone)]
+pub struct Material {
+    pub micromodulus: f64,
+    pub young: f64,
+    pub weight: Weight,
+    pub growth: Option<Growth>,
 }
 
 /// `C` for the continuum's horizon integral: `9 E / (π δ³)` (equal energies at small biaxial strain, plane stress,
@@ -64,6 +78,27 @@ struct Pair {
 }
 
 impl BondBased {
+    /// `rows` material points come first in `points`; the others are fictitious. `shares` are those of all points.
+    pub fn new(
+        points: &Points,
+        rows: usize,
+        stencil: Stencil,
+        material: Material,
+        shares: Option<Vec<f64>>,
+    ) -> Self {
+        let micromodulus = material.micromodulus;
+        BondBased {
+            padded: Padded::new(points, rows, &stencil, micromodulus, shares.as_deref()),
+            family: Family::new(points, rows, stencil),
+            micromodulus,
+            young: material.young,
+            weight: material.weight,
+            growth: material.growth,
+            shares,
+            points: points.len(),
+        }
+    }
+
     fn pair(&self, values: &[f64], a: usize, i: usize, bond: &Bond) -> Pair {
         let x = |p: usize, d: usize| values[self.points + 2 * p + d];
         let xi = [x(i, 0) - x(a, 0), x(i, 1) - x(a, 1)];
@@ -82,16 +117,21 @@ impl BondBased {
         }
     }
 
-    /// Weighted energy density Ψ of a material point (eq 11) and the force density on it (eq 20 before it is set to
-    /// zero).
-    pub fn state(&self, values: &[f64], a: usize) -> (f64, [f64; 2]) {
-        let (mut energy, mut force) = (0.0, [0.0; 2]);
+    /// The state of every material point.
+    pub fn states(&self, values: &[f64]) -> Vec<PointState> {
+        self.padded.states(values, self.family.rows(), self.weight)
+    }
+
+    /// The state of one point, bond by bond.
+    pub fn state(&self, values: &[f64], a: usize) -> PointState {
+        let mut state = PointState::default();
         for (i, b) in self.family.of(a) {
             let p = self.pair(values, a, i, b);
-            energy += 0.5 * p.weight * p.energy;
-            (0..2).for_each(|d| force[d] += p.weight * p.pull * p.xi[d]);
+            state.energy += 0.5 * p.weight * p.energy;
+            state.by_density += 0.5 * p.by_density * p.energy;
+            (0..2).for_each(|d| state.force[d] += p.weight * p.pull * p.xi[d]);
         }
-        (energy, force)
+        state
     }
 
     /// Entries of `∂R/∂q`: those of each unknown's own point and of its family.
@@ -138,9 +178,9 @@ impl Step<'_> {
         values
     }
 
-    fn equation(&self, state: &[(f64, [f64; 2])], values: &[f64], value: usize) -> f64 {
+    fn equation(&self, states: &[PointState], values: &[f64], value: usize) -> f64 {
         let model = self.model;
-        let (energy, force) = state[model.point_of(value)];
+        let PointState { energy, force, .. } = states[model.point_of(value)];
         match (value.checked_sub(model.points), &model.growth) {
             (Some(place), _) => force[place % 2],
             (None, Some(growth)) => {
@@ -160,7 +200,7 @@ impl Step<'_> {
         let balance = growth.balance(
             values[a],
             self.old[a],
-            self.model.state(values, a).0,
+            self.model.state(values, a).energy,
             self.dt,
         );
         add(row, balance.by_density);
@@ -214,22 +254,16 @@ impl Step<'_> {
 impl Nonlinear for Step<'_> {
     fn residual(&self, q: &[f64], r: &mut [f64]) {
         let values = self.expand(q);
-        let state: Vec<_> = (0..self.model.family.rows())
-            .into_par_iter()
-            .with_min_len(64)
-            .map(|a| self.model.state(&values, a))
-            .collect();
+        let states = self.model.states(&values);
         for (row, r) in r.iter_mut().enumerate() {
-            *r = self.equation(&state, &values, self.map.equation(row));
+            *r = self.equation(&states, &values, self.map.equation(row));
         }
     }
 
     fn tangent(&self, q: &[f64], k: &mut Sparse) {
         let values = self.expand(q);
-        k.fill(|rows: &mut Rows| {
-            for row in rows.range() {
-                self.gather(&values, row, &mut |column, by| rows.add(row, column, by));
-            }
+        k.fill_rows(|row, dense| {
+            self.gather(&values, row, &mut |column, by| dense[column] += by);
         });
     }
 
@@ -257,28 +291,25 @@ impl Staggered for Step<'_> {
 
     fn local_diagonal(&self, q: &[f64], diagonal: &mut [f64]) {
         let values = self.expand(q);
-        diagonal.par_iter_mut().enumerate().for_each(|(row, out)| {
-            *out = 0.0;
+        let states = self.model.states(&values);
+        for (row, out) in diagonal.iter_mut().enumerate() {
             let a = self.map.equation(row);
-            self.density_row(&values, row, a, &mut |column, by| {
-                if column == row {
-                    *out += by;
-                }
+            *out = self.model.growth.as_ref().map_or(0.0, |growth| {
+                let b = growth.balance(values[a], self.old[a], states[a].energy, self.dt);
+                b.by_density + b.by_energy * states[a].by_density
             });
-        });
+        }
     }
 
     fn stiffness(&self, q: &[f64], k: &mut Sparse) {
         let values = self.expand(q);
         let first = self.local();
-        k.fill(|rows: &mut Rows| {
-            for row in rows.range() {
-                self.gather(&values, row + first, &mut |column, by| {
-                    if column >= first {
-                        rows.add(row, column - first, -by);
-                    }
-                });
-            }
+        k.fill_rows(|row, dense| {
+            self.gather(&values, row + first, &mut |column, by| {
+                if column >= first {
+                    dense[column - first] -= by;
+                }
+            });
         });
     }
 }

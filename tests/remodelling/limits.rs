@@ -1,0 +1,126 @@
+//! What remodelling scenes refuse, and how they stop.
+
+use super::square::{Square, simulate};
+
+#[test]
+fn a7_noise_settles_where_n_is_below_m_and_n_not_below_m_is_refused() {
+    let noisy = |exponent: f64| {
+        let model = format!("density = {{ exponent = {exponent:?}, noise = 0.01 }}");
+        Square {
+            steps: [0.0687; 4],
+            end: 6.0,
+            ..Square::new(20, 3.01)
+        }
+        .text()
+        .replace("young = 1.0", &format!("young = 1.0\n {model}"))
+    };
+    for exponent in [2.0, 2.5] {
+        let (summary, recorder) = simulate(&noisy(exponent)).unwrap();
+        assert!(summary.converged);
+        // Settled: the last time unit changes nothing.
+        let drift = recorder.at(6.0, "mean") - recorder.at(5.0, "mean");
+        assert!(drift.abs() < 1e-6, "n = {exponent}: {drift}");
+    }
+    for exponent in [3.0, 3.5, 4.0] {
+        let words = simulate(&noisy(exponent))
+            .map(|_| ())
+            .unwrap_err()
+            .to_string();
+        assert!(words.contains("is not below m = 3"), "{words}");
+    }
+}
+
+/// Absent physics is free: unknowns per point and what is stored.
+#[test]
+fn unknowns_per_point() {
+    let text = Square {
+        end: 0.1,
+        ..Square::new(10, 3.01)
+    }
+    .text();
+    let (growing, _) = simulate(&text).unwrap();
+    // Density and two placements each, less the pinned x.
+    assert_eq!(growing.unknowns, 3 * 100 - 1);
+    let elastic = text.replace("growth = { rate = 1000, stimulus = 0.01 }", "");
+    let (elastic, recorder) = simulate(&elastic).unwrap();
+    assert_eq!(elastic.unknowns, 2 * 100 - 1);
+    assert_eq!(recorder.at(0.1, "max"), 0.0);
+}
+
+#[test]
+fn a_step_too_large_stops_with_the_last_good_state() {
+    let mut square = Square {
+        end: 2.0,
+        ..Square::new(10, 3.01)
+    };
+    square.steps = [0.06, 0.07, 0.08, 0.09];
+    // The second value turns the square inside out.
+    let text = square
+        .text()
+        .replace("until = [2, 4, 6, 8]", "until = [1, 4, 6, 8]")
+        .replace("0.07,", "-0.7,");
+    let text = text.replace("step = 0.1", "step = 0.1\n smallest_share = 0.125");
+    let (summary, recorder) = simulate(&text).unwrap();
+    assert!(!summary.converged);
+    let words = summary.stopped.unwrap();
+    assert!(words.contains("at t = 1.0"), "{words}");
+    assert!(
+        recorder.lines.iter().any(|l| l.contains("step halved")),
+        "{:?}",
+        recorder.lines
+    );
+    let last = recorder.frames.last().unwrap();
+    assert!((last.time - 1.0).abs() < 1e-9 && !last.fields.is_empty());
+}
+
+fn refusal(text: &str) -> String {
+    simulate(text).map(|_| ()).unwrap_err().to_string()
+}
+
+#[test]
+fn what_cannot_work_is_refused_in_words() {
+    let text = Square::new(10, 3.01).text();
+    let with = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        refusal(&text.replace(from, to))
+    };
+    let cases = [
+        (with("spacing", "spacng"), "did you mean `spacing`"),
+        (with("bond-based", "bond-bsed"), "did you mean `bond-based`"),
+        (with("young = 1.0", "young = -1.0"), "young"),
+        (
+            with("young = 1.0", "young = 1.0\n density = { initial = -0.5 }"),
+            "must be positive",
+        ),
+        (
+            with("young = 1.0", "young = 1.0\n density = { noise = 1.5 }"),
+            "must stay positive",
+        ),
+        (
+            with("component = 'x'", "component = 'z'"),
+            "give \"x\" or \"y\"",
+        ),
+        (
+            with("{ point = [0, 0] }", "{ disc = [9, 9, 1] }"),
+            "no point of the geometry",
+        ),
+        (
+            with("size = [1.0, 1.0]", "size = [1.03, 1.0]"),
+            "whole number of cells",
+        ),
+        (with("horizon_ratio = 3.01", "horizon = -1.0"), "δ/Δ"),
+        (with("step = 0.1", "step = 0.3"), "whole number of steps"),
+    ];
+    for (words, expected) in cases {
+        assert!(words.contains(expected), "{words}");
+    }
+    // Without the pinned point nothing holds x.
+    let (start, end) = (text.find("[[hold]]").unwrap(), text.find("[time]").unwrap());
+    let words = refusal(&format!("{}{}", &text[..start], &text[end..]));
+    assert!(words.contains("nothing holds the body along x"), "{words}");
+    let pieces = text.replace(
+        "geometry.rectangle.size = [1.0, 1.0]",
+        "geometry.polygon = { corners = [[0, 0], [1, 0], [1, 1], [0, 1]], holes = [[[-0.1, 0.3], [1.1, 0.3], [1.1, 0.7], [-0.1, 0.7]]] }",
+    );
+    assert!(refusal(&pieces).contains("2 unconnected pieces"));
+}

@@ -54,16 +54,15 @@ impl Anderson {
             self.weight[0] * dot(&a[..local], &b[..local])
                 + self.weight[1] * dot(&a[local..], &b[local..])
         };
-        let mut a = vec![vec![0.0; m + 1]; m];
-        for i in 0..m {
-            for j in 0..=i {
-                a[i][j] = inner(&self.changes[i], &self.changes[j]);
-                a[j][i] = a[i][j];
-            }
-            a[i][i] *= 1.0 + 1e-10;
-            a[i][m] = inner(&self.changes[i], f);
-        }
-        solve(a)
+        let row = |i: usize| {
+            let mut row: Vec<f64> = (0..m)
+                .map(|j| inner(&self.changes[i], &self.changes[j]))
+                .collect();
+            row[i] *= 1.0 + 1e-10;
+            row.push(inner(&self.changes[i], f));
+            row
+        };
+        solve((0..m).map(row).collect())
     }
 }
 
@@ -74,11 +73,12 @@ fn solve(mut a: Vec<Vec<f64>>) -> Vec<f64> {
         if a[k][k] <= 0.0 {
             return vec![0.0; m];
         }
-        for i in k + 1..m {
-            let factor = a[i][k] / a[k][k];
-            for j in k..=m {
-                a[i][j] -= factor * a[k][j];
-            }
+        let pivot = a[k].clone();
+        for row in &mut a[k + 1..] {
+            let factor = row[k] / pivot[k];
+            row.iter_mut()
+                .zip(&pivot)
+                .for_each(|(v, p)| *v -= factor * p);
         }
     }
     let mut x = vec![0.0; m];

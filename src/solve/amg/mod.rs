@@ -145,12 +145,8 @@ impl<'a, O: Coarsen> Amg<'a, O> {
     }
 }
 
-/// What the smoother leaves of the bound of the eigenvalues: polynomials of degree 2 still damp, if weakly, what lies up
-/// to 1.12 times above their interval, and most eigenvalues lie far below a bound.
-const SHRINK: f32 = 1.0 / 1.1;
-
 fn smoothing<const D: usize>(level: &impl Level<D>, degree: usize) -> Smoothing {
-    let largest = (SHRINK * level.eigenvalue_bound()).max(f32::MIN_POSITIVE);
+    let largest = level.eigenvalue_bound().max(f32::MIN_POSITIVE);
     // What a polynomial of this degree damps well: its interval begins at about 1 / (2 degree)².
     let range = [4.0, 8.0, 16.0, 25.0][degree.clamp(1, 4) - 1];
     Smoothing {

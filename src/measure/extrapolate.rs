@@ -2,7 +2,7 @@
 //!
 //! Both models come nearer to the limit as lattice parameter or element shrink, but not alike. The error of a graded
 //! lattice in bending, smeared over a cell, falls with the square of LP, beside scatter of where cells fall. That of voxel
-//! FE falls with the power 1.3 (edges of voxels; fitted on phantoms, `reports/speed-vs-error.md`), from above.
+//! FE falls with the power 1.3 (edges of voxels; 1.17 to 1.31 fitted on phantoms, `reports/speed-vs-error.md`), from above.
 
 use crate::measure::ffb::settings_of;
 use crate::measure::row::Row;
@@ -13,7 +13,7 @@ pub const EXTRAPOLATED: &str = "extrapolated";
 /// Order in LP of a graded lattice's error.
 const LATTICE_ORDER: f64 = 2.0;
 
-/// Order in element size of voxel FE's error: 1.27 to 1.31 fitted on phantoms over one, two and three elements a voxel.
+/// Order in element size of voxel FE's error: 1.17 to 1.31 fitted on phantoms over one, two and three elements a voxel.
 const VOXEL_ORDER: f64 = 1.3;
 
 /// Relative error of voxel FE, `VOXEL_ERROR · (element / strut thickness)^1.3`: the largest found on the phantoms.

@@ -128,7 +128,7 @@ def maps(name, files):
     for p in pictures:
         sheet.paste(p, (left, 0))
         left += p.width
-    sheet.quantize(64).save(OUT / f"{name}.png", optimize=True)
+    sheet.quantize(96, Image.Quantize.FASTOCTREE).save(OUT / f"{name}.png", optimize=True)
 
 
 maps("heat-disc", ["heat-disc/temperature_t1.png"])

@@ -26,12 +26,18 @@ impl Default for CgParams {
     }
 }
 
+/// Part of the start's energy below which the rest is nothing. The start is the field of a homogeneous bar: 1e-10 of it is
+/// far below any bone's stiffness and far above double precision's rounding.
+pub(super) const NOTHING: f64 = 1e-10;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ended {
     /// The estimated energy error met its tolerance.
     EnergyTolerance,
     /// The residual met its tolerance.
     ResidualTolerance,
+    /// The energy fell to nothing: what connects the held unknowns only turns and shifts.
+    Mechanism,
     IterationLimit,
     /// `pᵀAp <= 0` or a value that is not finite: the operator or preconditioner is not positive on the free unknowns.
     Breakdown,
@@ -39,7 +45,10 @@ pub enum Ended {
 
 impl Ended {
     pub fn converged(self) -> bool {
-        matches!(self, Ended::EnergyTolerance | Ended::ResidualTolerance)
+        matches!(
+            self,
+            Ended::EnergyTolerance | Ended::ResidualTolerance | Ended::Mechanism
+        )
     }
 }
 
@@ -126,6 +135,8 @@ pub fn minimise<const D: usize>(
             ended = Ended::ResidualTolerance;
         } else if error.is_some_and(|e| e <= params.energy_tolerance && energy > 0.0) {
             ended = Ended::EnergyTolerance;
+        } else if energy <= NOTHING * start_energy {
+            ended = Ended::Mechanism;
         }
     }
     // What follows needs one vector more.

@@ -8,7 +8,7 @@ use crate::operator::SinglePreconditioner;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::par::{CHUNK, sum_chunks};
-use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended};
+use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, NOTHING};
 use crate::solve::estimate::EnergyTail;
 use rayon::prelude::*;
 
@@ -69,6 +69,8 @@ pub fn minimise(
             ended = Ended::ResidualTolerance;
         } else if error.is_some_and(|e| e <= params.energy_tolerance && energy > 0.0) {
             ended = Ended::EnergyTolerance;
+        } else if energy <= NOTHING * start.energy {
+            ended = Ended::Mechanism;
         } else if norm < REPLACE {
             let before = unit;
             unit *= norm;

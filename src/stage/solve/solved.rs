@@ -112,6 +112,10 @@ impl Solved {
             }
             Ended::IterationLimit => Some("not converged: iteration limit reached".into()),
             Ended::Breakdown => Some("not converged: the model is not positive definite".into()),
+            Ended::Mechanism => Some(
+                "what connects the loaded faces only turns and shifts: E_app is 0 to rounding"
+                    .into(),
+            ),
             Ended::EnergyTolerance | Ended::ResidualTolerance => None,
         }
     }

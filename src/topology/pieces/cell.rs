@@ -57,13 +57,8 @@ impl Cell {
     pub fn of(bone: &Volume<u8>, position_mm: [f64; 3], edge: f64, load: Axis) -> Option<Cell> {
         let grid = &bone.grid;
         let mut spans = Vec::with_capacity(3);
-        for a in 0..3 {
-            spans.push(Span::new(
-                position_mm[a],
-                edge,
-                grid.spacing_mm[a],
-                grid.n[a],
-            )?);
+        for (a, &position) in position_mm.iter().enumerate() {
+            spans.push(Span::new(position, edge, grid.spacing_mm[a], grid.n[a])?);
         }
         let m = [spans[0].len(), spans[1].len(), spans[2].len()];
         let mut labels = vec![NO_PIECE; m.iter().product()];

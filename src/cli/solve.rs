@@ -26,6 +26,9 @@ pub struct SolveArgs {
     /// 0.03; exit 1 where it cannot be met
     #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "coarsen", "lp", "boundary", "structure"])]
     error: Option<f64>,
+    /// voxel-fe: also write the model for another program: inp (CalculiX, Abaqus)
+    #[arg(long, value_name = "FORMAT", value_parser = ["inp"])]
+    export: Option<String>,
 }
 
 #[derive(Args)]
@@ -68,6 +71,9 @@ pub struct SolveSettings {
     /// voxel-fe: one element per N³ voxels
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     coarsen: Option<u16>,
+    /// Also count mechanisms (motions that cost next to no energy); takes a factorisation, for small models
+    #[arg(long)]
+    mechanisms: bool,
     /// Fields to write, comma-separated (displacement, energy-density, ...) [default: none]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     fields: Vec<String>,
@@ -88,6 +94,7 @@ impl SolveSettings {
         params.tolerance = self.tolerance.unwrap_or(params.tolerance);
         params.refine = self.refine.map_or(params.refine, usize::from);
         params.coarsen = self.coarsen.map_or(params.coarsen, usize::from);
+        params.mechanisms |= self.mechanisms;
         self.refuse_unavailable()?;
         params.check()
     }
@@ -109,6 +116,9 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     args.settings.apply(&mut params)?;
     let mut lattice = bonepd_ct::run::lattice::settings(&args.dir)?;
     args.lattice.apply(&mut lattice)?;
+    if args.export.is_some() {
+        bonepd_ct::run::solve::export_inp(&args.dir, &params, session)?;
+    }
     let (rows, met) = match args.error {
         Some(target) => {
             let found = bonepd_ct::run::adaptive::solve_to(&args.dir, target, &params, session)?;

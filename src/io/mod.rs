@@ -7,6 +7,7 @@ pub mod dicom;
 mod dicom_lengths;
 pub mod extent;
 pub mod html;
+pub mod inp;
 pub mod isq;
 pub mod lammps;
 pub mod map;

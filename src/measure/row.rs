@@ -53,4 +53,6 @@ pub struct Row {
     /// From a manifest.
     pub group: Option<String>,
     pub subject: Option<String>,
+    /// Motions that cost next to no energy, rigid motions of the whole apart; where `--mechanisms` asks for them.
+    pub mechanisms: Option<u64>,
 }

@@ -5,6 +5,7 @@
 pub mod coarsen;
 pub mod held;
 pub mod nonlinear;
+pub mod probe;
 pub mod reduction;
 pub mod sparse;
 

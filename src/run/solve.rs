@@ -1,7 +1,7 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
 use crate::error::Result;
-use crate::io::specimen;
+use crate::io::{inp, specimen};
 use crate::measure::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapolated};
 use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
@@ -68,6 +68,22 @@ pub fn solve(
         session.say(in_words(row));
     }
     Ok(all)
+}
+
+/// Writes the voxel elements of the specimen in `dir`, with material, supports and load, to `dir/voxel-fe.inp`.
+///
+/// # Errors
+/// A method or load without such a model, an unwritable file.
+pub fn export_inp(dir: &Path, params: &SolveParams, session: &Session) -> Result<()> {
+    params.check()?;
+    let path = dir.join("voxel-fe.inp");
+    if session.dry_run {
+        session.say(format!("would write {}", path.display()));
+        return Ok(());
+    }
+    inp::write(&path, &load(dir)?, params)?;
+    session.say(format!("wrote {}", path.display()));
+    Ok(())
 }
 
 /// Struts thinner than two lattice parameters are one or two sites thick.

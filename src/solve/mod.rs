@@ -7,6 +7,7 @@ pub mod chord;
 pub mod direct;
 pub mod estimate;
 pub mod fallback;
+pub mod inertia;
 pub mod jacobi;
 pub mod lanczos;
 pub mod mixed;

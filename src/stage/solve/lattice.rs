@@ -14,6 +14,7 @@ use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
 use crate::solve::fallback::minimise_or_fall_back;
 use crate::stage::lattice::{Boundary, Case, build, build_pieces};
+use crate::stage::solve::mechanisms::mechanisms;
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::{Ends, Load, SolveParams};
 use crate::topology::placement::Frame;
@@ -41,6 +42,13 @@ pub fn solve_lattice(
     let moduli =
         lattice::Moduli::new(case.structure, case.lp_mm, params.young_mpa, params.poisson)?;
     if case.in_pieces() {
+        if params.mechanisms {
+            return Err(Error::setting(
+                "mechanisms",
+                "pieces of bone that share a graded lattice's site share its place on the grid, too",
+                "count mechanisms on firm and floppy lattices or with --method voxel-fe",
+            ));
+        }
         let pieces = build_pieces(specimen, case, params.axis, params.grip_mm)?;
         if pieces.is_empty() {
             return Ok(Solved::disconnected(pieces.dropped));
@@ -75,9 +83,29 @@ pub fn solve_lattice(
         true => model.site_virial(u, s),
         false => 0.0,
     };
-    Ok(solve_model(
+    let mechanisms = match params.mechanisms {
+        true => Some(count_mechanisms(&model, &laid, moduli, params)?),
+        false => None,
+    };
+    let solved = solve_model(
         &model, &springs, &virial, &laid, specimen, case, params, observe,
-    ))
+    );
+    Ok(Solved {
+        mechanisms,
+        ..solved
+    })
+}
+
+/// A bond spans up to two grid steps along an axis (SC: one); volumetric sums couple the ends of two bonds.
+fn count_mechanisms(
+    model: &Lattice,
+    laid: &Laid,
+    moduli: lattice::Moduli,
+    params: &SolveParams,
+) -> Result<usize> {
+    let bonds = if moduli.t == 0.0 { 1 } else { 2 };
+    let reach = bonds * laid.frame.structure.steps_per_lp() as i32;
+    mechanisms(model, &supports(laid, params, 0.0).0, laid.indices, reach)
 }
 
 /// Where a lattice's sites lie, of whichever kind they are.
@@ -139,6 +167,7 @@ fn solve_model(
         residual: info.residual,
         ended: info.ended,
         moduli: assess(model, virial, laid, case.boundary, &loaded, &u, &info),
+        mechanisms: None,
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod bricks;
 pub mod lattice;
+pub mod mechanisms;
 pub mod solved;
 pub mod stiffness;
 pub mod voxel_fe;
@@ -112,6 +113,8 @@ pub struct SolveParams {
     pub refine: usize,
     /// voxel-fe: this many voxels along every axis become one element, bone fractions kept as factors of its modulus.
     pub coarsen: usize,
+    /// Count mechanisms, too; takes a factorisation.
+    pub mechanisms: bool,
 }
 
 impl Default for SolveParams {
@@ -130,6 +133,7 @@ impl Default for SolveParams {
             max_iterations: 200_000,
             refine: 1,
             coarsen: 1,
+            mechanisms: false,
         }
     }
 }

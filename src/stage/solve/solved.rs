@@ -29,6 +29,8 @@ pub struct Solved {
     pub residual: f64,
     pub ended: Ended,
     pub moduli: Moduli,
+    /// Where asked for.
+    pub mechanisms: Option<usize>,
 }
 
 impl Solved {
@@ -49,6 +51,7 @@ impl Solved {
             residual: 0.0,
             ended: Ended::ResidualTolerance,
             moduli: zero,
+            mechanisms: None,
         }
     }
 
@@ -99,6 +102,7 @@ impl Solved {
             e_app_reaction_mpa: Some(m.from_reaction_mpa),
             e_app_stress_mpa: Some(m.from_stress_mpa),
             algebraic_error_mpa: Some(m.algebraic_error_mpa).filter(|e| e.is_finite()),
+            mechanisms: self.mechanisms.map(|n| n as u64),
             note: self.note(),
             ..settings
         }

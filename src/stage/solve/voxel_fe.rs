@@ -10,6 +10,7 @@ use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
 use crate::solve::fallback::minimise_mixed_or_fall_back;
 use crate::stage::solve::bricks::{Bricks, Keep};
+use crate::stage::solve::mechanisms::mechanisms;
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::{Ends, Load, SolveParams};
 use crate::topology::voxels::{Planes, VoxelMesh};
@@ -51,6 +52,10 @@ pub fn solve_voxels(
         max_iterations: params.max_iterations,
         ..CgParams::default()
     };
+    let mechanisms = match params.mechanisms {
+        true => Some(mechanisms(&model, &held, &grid_places(mesh), 1)?),
+        false => None,
+    };
     let preconditioner = Amg::new(&model, &held, &AmgParams::new(mesh.grid.spacing_mm));
     let info = minimise_mixed_or_fall_back(&model, &held, &preconditioner, &mut u, &cg, observe);
     drop(preconditioner);
@@ -62,11 +67,12 @@ pub fn solve_voxels(
         residual: info.residual,
         ended: info.ended,
         moduli: assess(&model, mesh, grips, &loaded, &u, &info),
+        mechanisms,
     })
 }
 
 /// Which unknowns are held, and a start that meets them: the field of a homogeneous bar.
-fn supports(
+pub fn supports(
     mesh: &VoxelMesh,
     grips: Planes,
     params: &SolveParams,
@@ -98,6 +104,13 @@ fn supports(
         }
     }
     (held, u)
+}
+
+/// Node indices of every node.
+pub fn grid_places(mesh: &VoxelMesh) -> Vec<[i32; 3]> {
+    (0..mesh.len())
+        .map(|node| mesh.indices(node).map(|v| v as i32))
+        .collect()
 }
 
 /// How far a plane lies from the lower grip to the upper: 0 to 1.

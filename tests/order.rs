@@ -1,0 +1,161 @@
+//! The order at which voxel elements and lattices approach the solid, on a body whose elastic field is known: a block
+//! displaced on its surface by `u = ∇φ`, `φ = e^{cz} cos ax cos ay`, `c = √2 a`. φ is harmonic, so u meets Navier's
+//! equation for any material; it is smooth and nowhere affine.
+
+use bonepd_ct::grid::{Axis, Grid};
+use bonepd_ct::operator::Operator;
+use bonepd_ct::operator::held::{Constrained, Held};
+use bonepd_ct::physics::hex8::Hex8;
+use bonepd_ct::physics::hex8::element::Integration;
+use bonepd_ct::physics::lattice::{Lattice, Moduli};
+use bonepd_ct::solve::cg::{CgParams, minimise};
+use bonepd_ct::solve::jacobi::Jacobi;
+use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build};
+use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
+use bonepd_ct::volume::{Specimen, Volume};
+
+const A: f64 = 2.0;
+const C: f64 = std::f64::consts::SQRT_2 * A;
+const YOUNG_MPA: f64 = 1000.0;
+const POISSON: f64 = 0.3;
+
+fn displacement([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let (sx, cx) = (A * x).sin_cos();
+    let (sy, cy) = (A * y).sin_cos();
+    let e = (C * z).exp();
+    [-A * e * sx * cy, -A * e * cx * sy, C * e * cx * cy]
+}
+
+/// `∫ σ:ε dV` over the cube from `low` to `high`: the field has no dilatation, so it is `2 μ ∫ φ_ij φ_ij`.
+fn twice_energy(low: f64, high: f64) -> f64 {
+    let mu = YOUNG_MPA / (2.0 * (1.0 + POISSON));
+    let wave = |x: f64| (2.0 * A * x).sin() / (4.0 * A);
+    let (half, part) = (0.5 * (high - low), wave(high) - wave(low));
+    let (cosine, sine) = (half + part, half - part);
+    let along = ((2.0 * C * high).exp() - (2.0 * C * low).exp()) / (2.0 * C);
+    let planes = 6.0 * cosine * cosine + 2.0 * sine * sine + 8.0 * sine * cosine;
+    2.0 * mu * A.powi(4) * along * planes
+}
+
+/// Minimises with everything in `held` where the exact field puts it.
+fn solve(operator: &impl Operator<3>, held: &Held, at: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut u: Vec<[f64; 3]> = at.iter().map(|&p| displacement(p)).collect();
+    for (site, u) in u.iter_mut().enumerate() {
+        (0..3)
+            .filter(|&c| !held.is_held(site, c))
+            .for_each(|c| u[c] = 0.0);
+    }
+    let jacobi = Jacobi::new(&Constrained {
+        inner: operator,
+        held,
+    });
+    let params = CgParams {
+        energy_tolerance: 0.0,
+        residual_tolerance: 1e-10,
+        ..CgParams::default()
+    };
+    assert!(
+        minimise(operator, held, &jacobi, &mut u, &params, |_| ())
+            .ended
+            .converged()
+    );
+    u
+}
+
+/// Orders between neighbouring refinements by two.
+fn orders(errors: &[f64]) -> Vec<f64> {
+    errors.windows(2).map(|e| (e[0] / e[1]).log2()).collect()
+}
+
+fn block(n: usize) -> Specimen {
+    let grid = Grid::new([n; 3], [1.0 / n as f64; 3]);
+    Specimen {
+        name: "block".into(),
+        bone: Volume::from_vec(grid, vec![1; grid.len()]),
+        tv_mm3: 1.0,
+        tv_definition: "box".into(),
+    }
+}
+
+#[test]
+fn voxel_elements_are_of_second_order_in_energy() {
+    let exact = twice_energy(0.0, 1.0);
+    for rule in [Integration::Full, Integration::MeanDilatation] {
+        let errors: Vec<f64> = [4, 8, 16, 32]
+            .iter()
+            .map(|&n| {
+                let bone = block(n).bone;
+                let grips = Planes::within(&bone.grid, Axis::Z, 0.0).unwrap();
+                let mesh = VoxelMesh::new(bone.grid, bone.as_slice(), |b| *b != 0, grips).unwrap();
+                let mut held = Held::none(mesh.len());
+                for node in 0..mesh.len() {
+                    let outer = mesh
+                        .indices(node)
+                        .iter()
+                        .any(|&i| i == 0 || i as usize == n);
+                    if outer || mesh.around[node] == 0 {
+                        (0..3).for_each(|c| held.hold(node, c));
+                    }
+                }
+                let mut at: Vec<_> = (0..mesh.len()).map(|node| mesh.position(node)).collect();
+                (0..mesh.len())
+                    .filter(|&i| mesh.around[i] == 0)
+                    .for_each(|i| at[i] = [0.0; 3]);
+                let model = Hex8::new(mesh, YOUNG_MPA, POISSON, rule);
+                let u = solve(&model, &held, &at);
+                let mut f = vec![[0.0; 3]; u.len()];
+                model.apply(&u, &mut f);
+                (bonepd_ct::par::dot(&u, &f) / exact - 1.0).abs()
+            })
+            .collect();
+        let orders = orders(&errors);
+        println!("{rule:?}: errors {errors:?}, orders {orders:?}");
+        // The coarsest pair is not yet in the asymptotic range.
+        assert!(
+            orders[1..].iter().all(|o| (1.9..2.1).contains(o)),
+            "{rule:?} {orders:?}"
+        );
+    }
+}
+
+/// Sites that miss a bond, or whose neighbours do, move as the solid does; the others find their places themselves.
+#[test]
+fn simple_cubic_lattices_are_of_second_order_in_displacement() {
+    let structure = Structure::Sc;
+    let mut errors = Vec::new();
+    for n in [12, 24, 48] {
+        let case = Case {
+            structure,
+            lp_mm: 1.0 / n as f64,
+            boundary: Boundary::Floppy,
+            registration_mm: [0.0; 3],
+        };
+        let sites = build(&block(n), &case, Axis::Z, 0.0).unwrap();
+        let moduli = Moduli::new(structure, case.lp_mm, YOUNG_MPA, POISSON).unwrap();
+        let model = Lattice::new(&sites, moduli);
+        let whole = |s: usize| sites.neighbours_of(s).iter().all(|&t| t as usize != s);
+        let inner =
+            |s: usize| whole(s) && sites.neighbours_of(s).iter().all(|&t| whole(t as usize));
+        let mut held = Held::none(sites.len());
+        for s in (0..sites.len()).filter(|&s| !inner(s)) {
+            (0..3).for_each(|c| held.hold(s, c));
+        }
+        let at: Vec<_> = sites
+            .indices
+            .iter()
+            .map(|&i| sites.frame.position_mm(i))
+            .collect();
+        let u = solve(&model, &held, &at);
+        let squared = |s: usize| -> f64 {
+            let exact = displacement(at[s]);
+            (0..3).map(|c| (u[s][c] - exact[c]).powi(2)).sum()
+        };
+        let inside: Vec<usize> = (0..sites.len()).filter(|&s| inner(s)).collect();
+        let mean = inside.iter().map(|&s| squared(s)).sum::<f64>() / inside.len() as f64;
+        errors.push(mean.sqrt());
+    }
+    let orders = orders(&errors);
+    println!("errors {errors:?}, orders {orders:?}");
+    // The rim that is held is two sites wide, so the coarser pair measures different bodies: 1.71, then 1.86.
+    assert!((1.8..2.2).contains(&orders[1]), "{orders:?}");
+}

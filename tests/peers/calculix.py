@@ -1,0 +1,137 @@
+"""Voxel elements against CalculiX (Debian: calculix-ccx), C3D8 bricks with full integration, on exported models.
+
+    cargo build --release && python3 tests/peers/calculix.py
+
+Each model is solved here and there; E_app from CalculiX's reaction force must agree to 0.1 %.
+"""
+
+import json
+import pathlib
+import random
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = ROOT / "target/release/bonepd-ct"
+LIMIT = 1e-3
+
+
+def nifti(path, n, spacing, bone):
+    """A NIfTI-1 volume of 0 and 1, x fastest."""
+    head = bytearray(352)
+    struct.pack_into("<i", head, 0, 348)
+    struct.pack_into("<8h", head, 40, 3, *n, 1, 1, 1, 1)
+    struct.pack_into("<hh", head, 70, 2, 8)
+    struct.pack_into("<8f", head, 76, 1, *spacing, 0, 0, 0, 0)
+    struct.pack_into("<fff", head, 108, 352, 1, 0)
+    head[123] = 2  # mm
+    head[344:348] = b"n+1\0"
+    voxels = bytes(bone(x, y, z) for z in range(n[2]) for y in range(n[1]) for x in range(n[0]))
+    path.write_bytes(bytes(head) + voxels)
+
+
+def struts(seed, cell, thick, broken):
+    """Struts on a grid of cells, some of them broken; plates where the draw says so."""
+    draw = random.Random(seed)
+    missing = {}
+
+    def bone(x, y, z):
+        p = (x, y, z)
+        thin = [v % cell < thick for v in p]
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            key = (a, p[a] // cell, p[b] // cell, p[c] // cell)
+            if key not in missing:
+                missing[key] = draw.random() < broken
+            if thin[b] and thin[c] and (thin[a] or not missing[key]):
+                return 1
+        return 0
+
+    return bone
+
+
+def waves(x, y, z):
+    from math import cos, sin
+
+    k = 0.45
+    return int(abs(sin(k * x) * cos(k * y) + sin(k * y) * cos(k * z) + sin(k * z) * cos(k * x)) < 0.45)
+
+
+SPECIMENS = {
+    "struts": ((20, 20, 20), (0.02, 0.02, 0.02), struts(1, 7, 2, 0.3)),
+    "struts 1:1:3": ((22, 20, 12), (0.02, 0.02, 0.06), struts(2, 6, 2, 0.2)),
+    "plates": ((18, 20, 22), (0.021, 0.02, 0.018), waves),
+}
+LOADS = [
+    [],
+    ["--ends", "bonded"],
+    ["--load", "confined"],
+    ["--axis", "x"],
+    ["--grip-mm", "0.08", "--poisson", "0.1"],
+    ["--refine", "2", "--ends", "bonded"],
+]
+
+
+STACK = ROOT.parent / "shared/data/lhdl_3155_D_4_bc"
+CROP = ["--spacing", "0.0195", "--gaussian", "1", "--lower", "63", "--crop", "60:96,60:96,80:116"]
+
+
+def calculix(folder):
+    """The force of the moving grip along x, y, z in N."""
+    run = subprocess.run(["ccx", "voxel-fe"], cwd=folder, capture_output=True, text=True)
+    if run.returncode != 0:
+        sys.exit(f"ccx failed: {run.stdout[-2000:]}{run.stderr[-500:]}")
+    text = (folder / "voxel-fe.dat").read_text()
+    found = re.search(r"total force \(fx,fy,fz\) for set HIGH[^\n]*\n\s*\n([^\n]+)", text)
+    return [float(v) for v in found.group(1).split()]
+
+
+def compare(folder, name, flags):
+    command = [PROGRAM, "solve", folder, "--method", "voxel-fe", "--tolerance", "1e-8", "--export", "inp", "--json"]
+    run = subprocess.run([*command, *flags], capture_output=True, text=True)
+    if run.returncode != 0:
+        sys.exit(f"{name} {flags}: {run.stderr}")
+    row = json.loads(run.stdout)[-1]
+    axis = "xyz".index(row["axis"])
+    head = (folder / "voxel-fe.inp").read_text().split("\n", 1)[0]
+    gauge, moved = (float(v) for v in re.search(r"HIGH x (\S+) mm / \(area x (\S+) mm\)", head).groups())
+    record = json.loads((folder / "segment.json").read_text())
+    n, h = record["results"]["voxels"], record["results"]["spacing_mm"]
+    area = row["tv_mm3"] / (n[axis] * h[axis])
+    theirs = calculix(folder)[axis] * gauge / (area * moved)
+    ours = row["e_app_mpa"]
+    off = ours / theirs - 1
+    words = " ".join(flags) or "uniaxial, ends free"
+    print(f"{name:13} {words:34} {row['unknowns']:7} unknowns  {ours:10.5f} MPa  CalculiX {theirs:10.5f}  {off:+.1e}")
+    return abs(off)
+
+
+def main():
+    if shutil.which("ccx") is None:
+        print("skipped: ccx is not installed (Debian: calculix-ccx)")
+        return
+    worst = 0.0
+    with tempfile.TemporaryDirectory() as temporary:
+        for name, (n, spacing, bone) in SPECIMENS.items():
+            base = pathlib.Path(temporary) / name.replace(" ", "-").replace(":", "-")
+            scan = base.with_suffix(".nii")
+            nifti(scan, n, spacing, bone)
+            subprocess.run([PROGRAM, "segment", scan, "-o", base, "--lower", "1", "--quiet"], check=True)
+            worst = max([worst, *(compare(base, name, flags) for flags in LOADS)])
+        if STACK.is_dir():
+            base = pathlib.Path(temporary) / "stack"
+            subprocess.run([PROGRAM, "segment", STACK, "-o", base, "--quiet", *CROP], check=True)
+            worst = max([worst, *(compare(base, "real bone", flags) for flags in LOADS[:3])])
+        else:
+            print(f"skipped: {STACK} is not here")
+    print(f"largest difference {worst:.1e}")
+    if worst > LIMIT:
+        sys.exit(f"more than {LIMIT}")
+
+
+if __name__ == "__main__":
+    main()

@@ -6,6 +6,7 @@ mod cli;
 mod cohort;
 mod exports;
 mod formats;
+mod fuzz;
 mod laws;
 mod layers;
 mod molecular;

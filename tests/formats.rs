@@ -1,18 +1,15 @@
-//! Every reader against malformed files: damaged headers, truncated data, sizes that lie, wrong magic. No panic, no
-//! memory beyond what the file can hold. `BONEPD_FUZZ_CASES` sets how many files per format are tried.
+//! Every reader on a small sound file of its format, written by hand or by another crate.
 
 use bonepd_ct::grid::Grid;
 use bonepd_ct::io::{nifti, scan, tiff};
 use bonepd_ct::volume::Volume;
-use rayon::prelude::*;
-use std::path::Path;
 
-fn volume() -> Volume<i16> {
+pub fn volume() -> Volume<i16> {
     let grid = Grid::new([5, 4, 3], [0.02; 3]);
     Volume::from_vec(grid, (0..60).map(|v| v * 50 - 900).collect())
 }
 
-fn bytes_of(volume: &Volume<i16>) -> Vec<u8> {
+pub fn bytes_of(volume: &Volume<i16>) -> Vec<u8> {
     volume
         .as_slice()
         .iter()
@@ -21,7 +18,7 @@ fn bytes_of(volume: &Volume<i16>) -> Vec<u8> {
 }
 
 /// Name and bytes of one sound file per format.
-fn sound_files() -> Vec<(&'static str, Vec<u8>)> {
+pub fn sound_files() -> Vec<(&'static str, Vec<u8>)> {
     let dir = tempfile::tempdir().unwrap();
     let v = volume();
     let written = |name: &str| {
@@ -58,7 +55,7 @@ fn sound_files() -> Vec<(&'static str, Vec<u8>)> {
         ("a.aim", aim_v3(&data)),
         ("b.aim", aim_v2_runs()),
         ("a.isq", isq(&data)),
-        ("a.dcm", dicom(&data[..40])),
+        ("a.dcm", dicom(&data[..40], false)),
     ]
 }
 
@@ -94,7 +91,7 @@ fn aim_v2_runs() -> Vec<u8> {
     [out, image, data.to_vec()].concat()
 }
 
-fn isq(data: &[u8]) -> Vec<u8> {
+pub fn isq(data: &[u8]) -> Vec<u8> {
     let mut head = vec![0u8; 512];
     head[..16].copy_from_slice(b"CTDATA-HEADER_V1");
     for (a, n) in [5i32, 4, 3].into_iter().enumerate() {
@@ -105,62 +102,62 @@ fn isq(data: &[u8]) -> Vec<u8> {
     [head, data.to_vec()].concat()
 }
 
-/// One slice of 5 × 4 pixels, implicit little-endian elements after an explicit meta group.
-fn dicom(data: &[u8]) -> Vec<u8> {
-    let explicit = |group: u16, element: u16, vr: &str, value: &str| {
-        let mut value = value.as_bytes().to_vec();
+/// One slice of 5 × 4 pixels: an explicit meta group, then elements with their type or, `implicit`, without.
+pub fn dicom(data: &[u8], implicit: bool) -> Vec<u8> {
+    let element = |implicit: bool, group: u16, element: u16, vr: &str, value: &[u8]| {
+        let mut value = value.to_vec();
         if value.len() % 2 == 1 {
             value.push(if vr == "UI" { 0 } else { b' ' });
         }
         let mut out = [group.to_le_bytes(), element.to_le_bytes()].concat();
-        out.extend(vr.as_bytes());
-        out.extend((value.len() as u16).to_le_bytes());
-        out.extend(value);
-        out
+        let length = value.len() as u32;
+        match (implicit, vr) {
+            (true, _) => out.extend(length.to_le_bytes()),
+            (false, "OW") => out.extend([b"OW\0\0", &length.to_le_bytes()[..]].concat()),
+            (false, _) => {
+                out.extend(vr.as_bytes());
+                out.extend((length as u16).to_le_bytes());
+            }
+        }
+        [out, value].concat()
     };
-    let short = |group: u16, element: u16, value: u16| {
-        let mut out = [group.to_le_bytes(), element.to_le_bytes()].concat();
-        out.extend(b"US");
-        out.extend(2u16.to_le_bytes());
-        out.extend(value.to_le_bytes());
-        out
+    let syntax = match implicit {
+        true => "1.2.840.10008.1.2",
+        false => "1.2.840.10008.1.2.1",
     };
     let meta = [
-        explicit(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2"),
-        explicit(2, 3, "UI", "1.2.3.4"),
-        explicit(2, 0x10, "UI", "1.2.840.10008.1.2.1"),
+        (2, "1.2.840.10008.5.1.4.1.1.2"),
+        (3, "1.2.3.4"),
+        (0x10, syntax),
     ]
+    .map(|(tag, value)| element(false, 2, tag, "UI", value.as_bytes()))
     .concat();
-    let mut length = [2u16.to_le_bytes(), 0u16.to_le_bytes()].concat();
-    length.extend(b"UL");
-    length.extend(4u16.to_le_bytes());
-    length.extend((meta.len() as u32).to_le_bytes());
-    let mut body = [
-        explicit(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2"),
-        explicit(8, 0x18, "UI", "1.2.3.4"),
-        explicit(0x10, 0x10, "PN", "Patient^Jane"),
-        explicit(0x18, 0x50, "DS", "0.06"),
-        explicit(0x20, 0xE, "UI", "1.2.3"),
-        explicit(0x20, 0x13, "IS", "1"),
-        explicit(0x20, 0x32, "DS", "0\\0\\0"),
-        explicit(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0"),
+    let length = element(false, 2, 0, "UL", &(meta.len() as u32).to_le_bytes());
+    let text = |group, tag, vr, value: &str| element(implicit, group, tag, vr, value.as_bytes());
+    let short = |group, tag, value: u16| element(implicit, group, tag, "US", &value.to_le_bytes());
+    let body = [
+        text(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2"),
+        text(8, 0x18, "UI", "1.2.3.4"),
+        text(0x10, 0x10, "PN", "Patient^Jane"),
+        text(0x18, 0x50, "DS", "0.06"),
+        text(0x20, 0xE, "UI", "1.2.3"),
+        text(0x20, 0x13, "IS", "1"),
+        text(0x20, 0x32, "DS", "0\\0\\0"),
+        text(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0"),
         short(0x28, 2, 1),
-        explicit(0x28, 4, "CS", "MONOCHROME2"),
+        text(0x28, 4, "CS", "MONOCHROME2"),
         short(0x28, 0x10, 4),
         short(0x28, 0x11, 5),
-        explicit(0x28, 0x30, "DS", "0.02\\0.02"),
+        text(0x28, 0x30, "DS", "0.02\\0.02"),
         short(0x28, 0x100, 16),
         short(0x28, 0x101, 16),
         short(0x28, 0x102, 15),
         short(0x28, 0x103, 1),
-        explicit(0x28, 0x1052, "DS", "-1000"),
-        explicit(0x28, 0x1053, "DS", "2"),
+        text(0x28, 0x1052, "DS", "-1000"),
+        text(0x28, 0x1053, "DS", "2"),
+        element(implicit, 0x7FE0, 0x10, "OW", data),
     ]
     .concat();
-    body.extend([0xE0, 0x7F, 0x10, 0x00]);
-    body.extend(b"OW\0\0");
-    body.extend((data.len() as u32).to_le_bytes());
-    body.extend(data);
     [vec![0u8; 128], b"DICM".to_vec(), length, meta, body].concat()
 }
 
@@ -205,120 +202,4 @@ fn sound_files_are_read() {
             ),
         }
     }
-}
-
-/// A generator of its own, so that a failing case can be made again from its number.
-fn random(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let z = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
-}
-
-/// Damage of the kinds that files meet: cut, flipped, overwritten with extremes, digits in headers made large.
-fn damaged(sound: &[u8], case: u64) -> Vec<u8> {
-    let mut state = case;
-    let mut bytes = sound.to_vec();
-    for _ in 0..1 + random(&mut state) % 4 {
-        // Headers come first: that is where damage is tried most.
-        let reach = if random(&mut state).is_multiple_of(3) {
-            bytes.len()
-        } else {
-            bytes.len().min(600)
-        };
-        let at = random(&mut state) as usize % reach.max(1);
-        match random(&mut state) % 7 {
-            0 => bytes.truncate(at),
-            1 => bytes[at] ^= 1 << (random(&mut state) % 8),
-            2 => bytes[at] = random(&mut state) as u8,
-            3 => {
-                let value = [
-                    u64::MAX,
-                    i64::MAX as u64,
-                    u64::from(u32::MAX),
-                    0x7FFF_FFFF,
-                    0x8000_0000,
-                    0,
-                ][random(&mut state) as usize % 6];
-                let width = [2, 4, 8][random(&mut state) as usize % 3];
-                let end = (at + width).min(bytes.len());
-                bytes[at..end].copy_from_slice(&value.to_le_bytes()[..end - at]);
-            }
-            4 => {
-                let digits: Vec<usize> =
-                    (0..reach).filter(|&i| bytes[i].is_ascii_digit()).collect();
-                if let Some(&i) = digits.get(random(&mut state) as usize % digits.len().max(1)) {
-                    let long: &[u8] = [
-                        &b"99999999999999999999"[..],
-                        b"4294967295",
-                        b"-1",
-                        b"65536",
-                        b"nan",
-                        b"1e308",
-                    ][random(&mut state) as usize % 6];
-                    bytes.splice(i..=i, long.iter().copied());
-                }
-            }
-            5 => {
-                let end = (at + random(&mut state) as usize % 64).min(bytes.len());
-                bytes.drain(at..end);
-            }
-            _ => bytes.extend(std::iter::repeat_n(0xFF, random(&mut state) as usize % 64)),
-        }
-        if bytes.is_empty() {
-            break;
-        }
-    }
-    bytes
-}
-
-/// The most memory that the process has used, in MiB.
-fn peak_mib() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    line.split_whitespace()
-        .next()?
-        .parse::<u64>()
-        .ok()
-        .map(|kib| kib / 1024)
-}
-
-#[test]
-fn damaged_files_are_refused_or_read_never_a_panic_nor_runaway_memory() {
-    let cases: u64 = std::env::var("BONEPD_FUZZ_CASES")
-        .ok()
-        .and_then(|v| v.parse().ok())
-        .unwrap_or(300);
-    let dir = tempfile::tempdir().unwrap();
-    let before = peak_mib().unwrap_or(0);
-    for (name, sound) in sound_files() {
-        let refused: u64 = (0..cases)
-            .into_par_iter()
-            .map(|case| {
-                let path = dir.path().join(format!("{case}_{name}"));
-                std::fs::write(&path, damaged(&sound, case)).unwrap();
-                let path: &Path = &path;
-                let read = std::panic::catch_unwind(|| scan::read(path, Some([0.02; 3])));
-                std::fs::remove_file(path).unwrap();
-                let read = read.unwrap_or_else(|_| panic!("{name}: case {case} panicked"));
-                if let Ok(scan) = &read {
-                    // Nothing unpacks here to more than a few thousand times its file.
-                    assert!(
-                        scan.volume.grid.len() < 4_000_000,
-                        "{name}: case {case}: {:?}",
-                        scan.volume.grid
-                    );
-                }
-                u64::from(read.is_err())
-            })
-            .sum();
-        println!("{name}: {cases} damaged files, {refused} refused");
-        assert!(
-            refused * 5 > cases,
-            "{name}: only {refused} of {cases} refused: is the damage real?"
-        );
-    }
-    let grown = peak_mib().unwrap_or(0).saturating_sub(before);
-    // Files are below 2 KiB. Other tests run in this process too, so the bound is loose: no gigabytes.
-    assert!(grown < 400, "{grown} MiB");
 }

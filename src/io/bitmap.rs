@@ -1,9 +1,13 @@
 //! Owns PNG and BMP slices. Neither carries a voxel size.
 
 use crate::error::{Error, Result};
+use crate::io::raw::MAX_EXPANSION;
 use crate::io::slices::Slice;
 use image::DynamicImage;
 use std::path::Path;
+
+/// Bytes of pixels per byte of a file: deflate's expansion, times four where a palette becomes colours.
+const MAX_PIXEL_BYTES: u64 = 4 * MAX_EXPANSION;
 
 pub fn read_slice(path: &Path) -> Result<Slice> {
     let wrong = |found: String, advice: &str| Error::file(path, found, advice);
@@ -13,8 +17,10 @@ pub fn read_slice(path: &Path) -> Result<Slice> {
             "check the path and its permissions",
         )
     })?;
+    let file_bytes = std::fs::metadata(path).map_or(0, |m| m.len());
     let mut limits = image::Limits::default();
-    limits.max_alloc = Some(2 << 30);
+    // The decoder takes memory for the whole image before it finds that the file ends: sizes must be believable.
+    limits.max_alloc = Some((1 << 20) + MAX_PIXEL_BYTES * file_bytes);
     reader.limits(limits);
     let image = reader.decode().map_err(|e| {
         wrong(

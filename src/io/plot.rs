@@ -117,6 +117,7 @@ fn plots_of(curve: &Curve) -> Vec<Plot> {
         Mark::Points => vec![Plot::Scatter(
             markers(curve, hue).with_legend(curve.name.clone()),
         )],
+        Mark::Rule if curve.name.is_empty() => vec![Plot::Line(line(curve, hue, "5 4"))],
         Mark::Rule => vec![Plot::Line(
             line(curve, hue, "5 4").with_legend(curve.name.clone()),
         )],

@@ -6,6 +6,8 @@ use crate::measure::row::Row;
 use crate::recipe::Recipe;
 use crate::run::estimate::{Estimate, estimate};
 use crate::run::queue;
+use crate::run::report::Failure;
+use crate::run::results::Results;
 use crate::run::scans::{self, ScanJob, Selection};
 use crate::run::session::Session;
 use crate::run::{Outcome, host, lattice, report, segment, solve};
@@ -95,7 +97,7 @@ impl Run<'_> {
     fn scan(&self, i: usize) {
         let job = &self.jobs[i];
         let dir = self.out.join(&job.name);
-        let own = self.session.logged(dir.join("log.txt"));
+        let own = self.session.logged(&job.name, dir.join("log.txt"));
         own.note(&format!(
             "{} {}: {}",
             env!("CARGO_PKG_NAME"),
@@ -149,12 +151,15 @@ impl Run<'_> {
         }
         atomic::create_dir(self.out)?;
         let rows = self.write_rows(&done)?;
+        let failures = failures(self.jobs, &done);
+        report::write_failures(self.out, &failures)?;
         if !rows.is_empty() {
             let recipe = toml::to_string(self.recipe).expect("settings are plain data");
             atomic::write(&self.out.join(report::RECIPE), &recipe)?;
             let dirs = [self.out.to_path_buf()];
             report::write(
                 &rows,
+                &failures,
                 &self.recipe.report,
                 &dirs,
                 Some(recipe),
@@ -184,7 +189,20 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
         row.group.clone_from(&job.group);
         row.subject.clone_from(&job.subject);
     }
+    Results::open(dir, false)?.label(&job.group, &job.subject)?;
     Ok(rows)
+}
+
+fn failures(jobs: &[ScanJob], done: &[Option<Result<Vec<Row>>>]) -> Vec<Failure> {
+    let failed = jobs.iter().zip(done).filter_map(|(job, solved)| {
+        let error = solved.as_ref()?.as_ref().err()?;
+        Some(Failure {
+            scan: job.name.clone(),
+            input: job.input.display().to_string(),
+            reason: error.to_string(),
+        })
+    });
+    failed.collect()
 }
 
 fn in_words(rows: &[Row]) -> String {

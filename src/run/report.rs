@@ -9,17 +9,43 @@ use crate::recipe::Recipe;
 use crate::run::host;
 use crate::run::session::Session;
 use crate::stage::report::{Report, ReportParams, report as assemble};
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The recipe as it was run, in the output folder of a run.
 pub const RECIPE: &str = "recipe.toml";
 
+/// Scans of a run that have no results, in its output folder; absent where there are none.
+const FAILED: &str = "failed.csv";
+
+/// A scan of a run that has no results: a line of `failed.csv`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+pub struct Failure {
+    pub scan: String,
+    pub input: String,
+    pub reason: String,
+}
+
+/// Writes `failed.csv`, or removes that of an earlier run.
+pub fn write_failures(out: &Path, failures: &[Failure]) -> Result<()> {
+    let file = out.join(FAILED);
+    match failures.is_empty() {
+        false => table::write(&file, failures),
+        true => {
+            let _ = std::fs::remove_file(file);
+            Ok(())
+        }
+    }
+}
+
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Returns
 /// the files written.
 pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<PathBuf>> {
     let mut rows: Vec<Row> = Vec::new();
+    let mut failures: Vec<Failure> = Vec::new();
     for dir in dirs {
         rows.extend(table::read(&results_file(dir)?)?);
+        failures.extend(table::read(&dir.join(FAILED)).unwrap_or_default());
     }
     session.detail(format!("{} rows from {} folders", rows.len(), dirs.len()));
     let recipe = dirs
@@ -29,7 +55,7 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
         .as_deref()
         .and_then(|text| Recipe::parse(text, Path::new(RECIPE)).ok())
         .map_or_else(ReportParams::default, |recipe| recipe.report);
-    write(&rows, &params, dirs, recipe, out, session)
+    write(&rows, &failures, &params, dirs, recipe, out, session)
 }
 
 fn results_file(dir: &Path) -> Result<PathBuf> {
@@ -47,13 +73,19 @@ fn results_file(dir: &Path) -> Result<PathBuf> {
 /// Writes the report of `rows` into `out`. `dirs` are searched for what is known of the scans.
 pub fn write(
     rows: &[Row],
+    failures: &[Failure],
     params: &ReportParams,
     dirs: &[PathBuf],
     recipe: Option<String>,
     out: &Path,
     session: &Session,
 ) -> Result<Vec<PathBuf>> {
-    let report = assemble(rows, params);
+    let mut report = assemble(rows, params);
+    let failed = failures.iter().map(|f| {
+        let reason = f.reason.lines().next().unwrap_or_default();
+        format!("{}: failed, no results: {reason}", f.scan)
+    });
+    report.notes.splice(0..0, failed);
     let mut files = render(&report, session)?;
     let source = Source {
         recipe,
@@ -179,7 +211,9 @@ fn threshold(record: &SegmentRecord) -> String {
         .unit
         .as_deref()
         .unwrap_or("in the image's units");
-    let bound = |v: Option<f64>| v.map_or("∞".to_owned(), |v| v.to_string());
+    // Otsu's threshold has digits that mean nothing.
+    let bound =
+        |v: Option<f64>| v.map_or("∞".to_owned(), |v| ((v * 1e3).round() / 1e3).to_string());
     format!(
         "{}: {} to {} {unit}",
         record.results.threshold,

@@ -91,16 +91,31 @@ impl Results {
 
     /// Keeps a solved row, in place of an older one of the same settings, and writes both files.
     pub fn keep(&mut self, blank: &Row, params: &SolveParams, row: &Row) -> Result<()> {
-        let new = KeyedRow {
+        let mut new = KeyedRow {
             row: row.clone(),
             key: Some(key(blank, params)),
             settings: Some(params.clone()),
         };
+        if let Some(KeyedRow { row: old, .. }) = self.record.rows.first() {
+            (new.row.group, new.row.subject) = (old.group.clone(), old.subject.clone());
+        }
         match self.record.rows.iter_mut().find(|old| old.key == new.key) {
             Some(old) => *old = new,
             None => self.record.rows.push(new),
         }
         self.write()
+    }
+
+    /// Marks all rows, and those to come, with the group and subject that a manifest gives.
+    pub fn label(&mut self, group: &Option<String>, subject: &Option<String>) -> Result<()> {
+        let mut changed = false;
+        for KeyedRow { row, .. } in &mut self.record.rows {
+            if row.group != *group || row.subject != *subject {
+                (row.group, row.subject) = (group.clone(), subject.clone());
+                changed = true;
+            }
+        }
+        if changed { self.write() } else { Ok(()) }
     }
 
     fn write(&self) -> Result<()> {

@@ -57,6 +57,7 @@ pub fn find(
             subject: None,
         }));
     }
+    refuse_names(&jobs)?;
     refuse_doubles(&jobs)?;
     if let Some(only) = &selection.only {
         jobs.retain(|job| job.name == *only);
@@ -162,6 +163,22 @@ fn descend(
     Ok(())
 }
 
+/// Names become folders beside the run's own files.
+fn refuse_names(jobs: &[ScanJob]) -> Result<()> {
+    const OWN: [&str; 3] = ["report", "results.csv", "recipe.toml"];
+    let path_like = |name: &str| name.contains(['/', '\\', '\0']) || [".", ".."].contains(&name);
+    for job in jobs {
+        let name = job.name.as_str();
+        if name.is_empty() || path_like(name) || OWN.contains(&name.to_lowercase().as_str()) {
+            return Err(Error::specimen(
+                format!("a scan cannot be named `{name}` ({})", job.input.display()),
+                "rename it, or list it in a manifest (CSV) with a column `name`: no slashes, and not the name of one of the run's own files",
+            ));
+        }
+    }
+    Ok(())
+}
+
 fn refuse_doubles(jobs: &[ScanJob]) -> Result<()> {
     let mut seen: HashMap<String, &ScanJob> = HashMap::new();
     for job in jobs {
@@ -251,6 +268,18 @@ mod tests {
                 .to_string()
                 .contains("two scans are named")
         );
+    }
+
+    #[test]
+    fn a_scan_cannot_take_the_place_of_the_runs_own_files() {
+        let dir = tree(&["report.nii", "a.nii"]);
+        let root = dir.path().to_path_buf();
+        let words = find_names(&[root], &Selection::default()).unwrap_err();
+        assert!(words.to_string().contains("cannot be named `report`"));
+        let manifest = dir.path().join("cohort.csv");
+        std::fs::write(&manifest, "path,name\na.nii,../../home\n").unwrap();
+        let words = find_names(&[manifest], &Selection::default()).unwrap_err();
+        assert!(words.to_string().contains("no slashes"), "{words}");
     }
 
     #[test]

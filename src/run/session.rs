@@ -17,6 +17,8 @@ pub struct Session {
     pub dry_run: bool,
     /// Redo what is up to date.
     pub force: bool,
+    /// The scan of a run that this session is about: warnings name it.
+    pub scan: Option<String>,
     pub output: Output,
 }
 
@@ -30,8 +32,9 @@ pub struct Output {
 
 impl Session {
     /// The session of one scan of a run: its words go to `file`, warnings to the terminal too.
-    pub fn logged(&self, file: PathBuf) -> Session {
+    pub fn logged(&self, scan: &str, file: PathBuf) -> Session {
         Session {
+            scan: Some(scan.to_owned()),
             quiet: self.quiet || !self.verbose,
             output: Output {
                 bars: self.output.bars.clone(),
@@ -62,10 +65,14 @@ impl Session {
 
     /// A warning on stderr. Shown even when quiet: it changes how a result is read.
     pub fn warn(&self, line: impl AsRef<str>) {
+        let scan = self
+            .scan
+            .as_ref()
+            .map_or(String::new(), |s| format!("{s}: "));
         self.note(&format!("warning: {}", line.as_ref()));
         self.output
             .bars
-            .suspend(|| eprintln!("warning: {}", line.as_ref()));
+            .suspend(|| eprintln!("warning: {scan}{}", line.as_ref()));
     }
 
     /// A line in the log alone.

@@ -4,6 +4,7 @@ use super::figure::{Axis, Content, Curve, Figure, Mark, Point};
 use super::table::{condition, varying_settings};
 use super::{Model, distinct};
 use crate::measure::row::Row;
+use crate::measure::statistics::regression::regression;
 
 /// Curves of one colour and marker: one structure, one model, one set of settings.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,27 +138,44 @@ fn with_error(s: &Solved) -> Point {
     }
 }
 
-/// E_app of each scan's finest solve against its BV/TV. None for fewer than two scans.
+/// E_app of each scan's finest solve against its BV/TV, with the least-squares line of each method over three scans or
+/// more. None for fewer than two scans.
 pub fn against_bv_tv(rows: &[Row]) -> Option<Figure> {
     let solved = solved(rows);
     if distinct(solved.iter().map(|s| &s.row.scan)).len() < 2 {
         return None;
     }
-    let curves = curves(&solved, Mark::Points, |members| {
+    let mut curves = curves(&solved, Mark::Points, |members| {
         finest(members)
             .iter()
             .map(|s| Point::new(s.row.bv_tv, s.e_app_mpa))
             .collect()
     });
+    let lines: Vec<Curve> = curves.iter().filter_map(least_squares).collect();
+    curves.extend(lines);
     Some(Figure {
         stem: "bv-tv".to_owned(),
         scan: None,
         title: "Stiffness and bone volume fraction".to_owned(),
-        caption: "Apparent modulus of each scan at its finest lattice parameter against BV/TV."
+        caption: "Apparent modulus of each scan at its finest lattice parameter against BV/TV, with least-squares lines."
             .to_owned(),
         x: Axis::linear("BV/TV"),
         y: Axis::linear("apparent modulus (MPa)"),
         content: Content::Curves(curves),
+    })
+}
+
+/// A line without a name: its colour says whose it is.
+fn least_squares(curve: &Curve) -> Option<Curve> {
+    let (x, y): (Vec<f64>, Vec<f64>) = curve.points.iter().map(|p| (p.x, p.y)).unzip();
+    let fit = regression(&x, &y)?;
+    let [low, high] = [f64::min, f64::max].map(|f| x.iter().copied().reduce(f).unwrap_or(0.0));
+    let at = |x: f64| Point::new(x, fit.intercept + fit.slope * x);
+    Some(Curve {
+        name: String::new(),
+        mark: Mark::Rule,
+        points: vec![at(low), at(high)],
+        ..curve.clone()
     })
 }
 

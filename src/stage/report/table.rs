@@ -28,6 +28,10 @@ pub struct Line {
     pub extrapolated_over_tissue: Option<f64>,
     /// All solves of the line together.
     pub wall_s: Option<f64>,
+    /// Stated algebraic and discretisation error of each model's modulus in MPa, by [`Model`]. Not a column: the rows of
+    /// `results.csv` hold them.
+    #[serde(skip)]
+    errors_mpa: [[Option<f64>; 2]; Model::ALL.len()],
 }
 
 impl Line {
@@ -42,7 +46,13 @@ impl Line {
         }
     }
 
+    /// Stated algebraic and discretisation error of the modulus in MPa, each where there is one.
+    pub fn errors_mpa(&self, model: Model) -> [Option<f64>; 2] {
+        self.errors_mpa[model as usize]
+    }
+
     fn add(&mut self, model: Model, row: &Row) {
+        self.errors_mpa[model as usize] = [row.algebraic_error_mpa, row.discretization_error_mpa];
         let (modulus, ratio) = match model {
             Model::Floppy => (&mut self.floppy_mpa, &mut self.floppy_over_tissue),
             Model::Firm => (&mut self.firm_mpa, &mut self.firm_over_tissue),

@@ -1,0 +1,286 @@
+//! Sound files to damage: every format in every way of storing it that has code of its own.
+
+use crate::formats::{dicom, sound_files, volume};
+use flate2::Compression;
+use flate2::write::{GzEncoder, ZlibEncoder};
+use std::io::{Cursor, Write};
+use tiff::encoder::{Compression as TiffCompression, TiffEncoder, colortype};
+
+/// A file, and what lies beside it undamaged.
+pub struct Sample {
+    /// Relative to a folder of its own.
+    pub name: &'static str,
+    pub bytes: Vec<u8>,
+    pub beside: Vec<(&'static str, Vec<u8>)>,
+}
+
+fn alone(name: &'static str, bytes: Vec<u8>) -> Sample {
+    Sample {
+        name,
+        bytes,
+        beside: Vec::new(),
+    }
+}
+
+pub fn samples() -> Vec<Sample> {
+    let mut all: Vec<Sample> = sound_files()
+        .into_iter()
+        .map(|(name, bytes)| alone(name, bytes))
+        .collect();
+    all.extend(nifti_kin());
+    all.extend(text_headers());
+    all.extend(tiffs());
+    all.extend(pictures());
+    all.extend(scanco());
+    all.push(alone("implicit.dcm", dicom(&le_bytes()[..40], true)));
+    all.extend(tables());
+    all
+}
+
+fn le_bytes() -> Vec<u8> {
+    crate::formats::bytes_of(&volume())
+}
+
+fn be_bytes() -> Vec<u8> {
+    let v = volume();
+    v.as_slice().iter().flat_map(|v| v.to_be_bytes()).collect()
+}
+
+fn zlib(bytes: &[u8]) -> Vec<u8> {
+    let mut out = ZlibEncoder::new(Vec::new(), Compression::default());
+    out.write_all(bytes).unwrap();
+    out.finish().unwrap()
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut out = GzEncoder::new(Vec::new(), Compression::default());
+    out.write_all(bytes).unwrap();
+    out.finish().unwrap()
+}
+
+/// A big-endian file and a pair of header and image, after `nifti1.h`.
+fn nifti_kin() -> [Sample; 2] {
+    let header = |magic: &[u8; 4], data_at: f32| {
+        let mut h = vec![0u8; 348];
+        h[..4].copy_from_slice(&348i32.to_be_bytes());
+        for (i, n) in [3i16, 5, 4, 3, 1, 1, 1, 1].into_iter().enumerate() {
+            h[40 + 2 * i..42 + 2 * i].copy_from_slice(&n.to_be_bytes());
+        }
+        h[70..72].copy_from_slice(&4i16.to_be_bytes());
+        h[72..74].copy_from_slice(&16i16.to_be_bytes());
+        for i in 0..4 {
+            h[76 + 4 * i..80 + 4 * i].copy_from_slice(&0.02f32.to_be_bytes());
+        }
+        h[108..112].copy_from_slice(&data_at.to_be_bytes());
+        h[123] = 2;
+        h[344..].copy_from_slice(magic);
+        h
+    };
+    let whole = [header(b"n+1\0", 352.0), vec![0; 4], be_bytes()].concat();
+    let pair = Sample {
+        name: "pair.hdr",
+        bytes: header(b"ni1\0", 0.0),
+        beside: vec![("pair.img", be_bytes())],
+    };
+    [alone("big-endian.nii", whole), pair]
+}
+
+fn text_headers() -> Vec<Sample> {
+    let meta =
+        "NDims = 3\nDimSize = 5 4 3\nElementType = MET_SHORT\nElementSpacing = 0.02 0.02 0.02\n";
+    let nrrd = "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 5 4 3\n\
+                space directions: (0.02,0,0) (0,0.02,0) (0,0,0.02)\nendian: little\n";
+    let data = le_bytes();
+    let with = |head: String, data: Vec<u8>| [head.into_bytes(), data].concat();
+    let numbers: Vec<String> = volume().as_slice().iter().map(i16::to_string).collect();
+    let slices = data.chunks(40).map(<[u8]>::to_vec);
+    vec![
+        alone(
+            "zlib.mha",
+            with(
+                format!("{meta}CompressedData = True\nElementDataFile = LOCAL\n"),
+                zlib(&data),
+            ),
+        ),
+        Sample {
+            name: "raw.mhd",
+            bytes: format!("{meta}HeaderSize = -1\nElementDataFile = raw.raw\n").into_bytes(),
+            beside: vec![("raw.raw", data.clone())],
+        },
+        Sample {
+            name: "list.mhd",
+            bytes: format!("{meta}ElementDataFile = LIST\ns0\ns1\ns2\n").into_bytes(),
+            beside: ["s0", "s1", "s2"].into_iter().zip(slices).collect(),
+        },
+        alone(
+            "gzip.nrrd",
+            with(format!("{nrrd}encoding: gzip\n\n"), gzip(&data)),
+        ),
+        alone(
+            "text.nrrd",
+            with(
+                format!("{nrrd}encoding: ascii\n\n"),
+                numbers.join(" ").into_bytes(),
+            ),
+        ),
+        Sample {
+            name: "apart.nhdr",
+            bytes: format!("{nrrd}encoding: raw\nbyte skip: -1\ndata file: raw.raw\n").into_bytes(),
+            beside: vec![("raw.raw", data)],
+        },
+    ]
+}
+
+fn tiffs() -> Vec<Sample> {
+    fn pages<K: tiff::encoder::TiffKind>(mut encoder: TiffEncoder<&mut Cursor<Vec<u8>>, K>) {
+        for page in volume().as_slice().chunks(20) {
+            encoder
+                .write_image::<colortype::GrayI16>(5, 4, page)
+                .unwrap();
+        }
+    }
+    let small = |compression| {
+        let mut out = Cursor::new(Vec::new());
+        pages(
+            TiffEncoder::new(&mut out)
+                .unwrap()
+                .with_compression(compression),
+        );
+        out.into_inner()
+    };
+    let mut big = Cursor::new(Vec::new());
+    pages(TiffEncoder::new_big(&mut big).unwrap());
+    vec![
+        alone("lzw.tif", small(TiffCompression::Lzw)),
+        alone("packbits.tif", small(TiffCompression::Packbits)),
+        alone("big.tif", big.into_inner()),
+        alone("imagej.tif", imagej()),
+        Sample {
+            name: "tiffs/s2.tif",
+            bytes: small_page(),
+            beside: vec![("tiffs/s10.tif", small_page())],
+        },
+    ]
+}
+
+fn small_page() -> Vec<u8> {
+    let mut out = Cursor::new(Vec::new());
+    TiffEncoder::new(&mut out)
+        .unwrap()
+        .write_image::<colortype::GrayI16>(5, 4, &volume().as_slice()[..20])
+        .unwrap();
+    out.into_inner()
+}
+
+/// One directory, three planes behind it: how ImageJ writes large stacks.
+fn imagej() -> Vec<u8> {
+    let text = b"ImageJ=1.53t\nimages=3\nslices=3\nunit=mm\nspacing=0.02\n\0";
+    let entries = 11u16;
+    let text_at = 8 + 2 + 12 * u32::from(entries) + 4;
+    let rational_at = text_at + text.len() as u32;
+    let data_at = rational_at + 8;
+    let mut out = b"II*\0\x08\0\0\0".to_vec();
+    out.extend(entries.to_le_bytes());
+    let mut entry = |tag: u16, kind: u16, count: u32, value: u32| {
+        out.extend(tag.to_le_bytes());
+        out.extend(kind.to_le_bytes());
+        out.extend(count.to_le_bytes());
+        out.extend(value.to_le_bytes());
+    };
+    for (tag, value) in [(256, 5), (257, 4), (258, 16), (259, 1), (262, 1)] {
+        entry(tag, 3, 1, value);
+    }
+    entry(270, 2, text.len() as u32, text_at);
+    entry(273, 4, 1, data_at);
+    entry(277, 3, 1, 1);
+    entry(279, 4, 1, 40);
+    entry(282, 5, 1, rational_at);
+    entry(283, 5, 1, rational_at);
+    out.extend(0u32.to_le_bytes());
+    out.extend(text);
+    out.extend(50u32.to_le_bytes());
+    out.extend(1u32.to_le_bytes());
+    let v = volume();
+    out.extend(v.as_slice().iter().flat_map(|v| (v + 900).to_le_bytes()));
+    out
+}
+
+fn pictures() -> Vec<Sample> {
+    let encoded = |format| {
+        let grey: Vec<u8> = (0..20u8).map(|v| v * 12).collect();
+        let mut out = Cursor::new(Vec::new());
+        image::GrayImage::from_raw(5, 4, grey)
+            .unwrap()
+            .write_to(&mut out, format)
+            .unwrap();
+        out.into_inner()
+    };
+    let (png, bmp) = (
+        encoded(image::ImageFormat::Png),
+        encoded(image::ImageFormat::Bmp),
+    );
+    vec![
+        Sample {
+            name: "pngs/s1.png",
+            beside: vec![("pngs/s2.png", png.clone())],
+            bytes: png,
+        },
+        Sample {
+            name: "bmps/s1.bmp",
+            beside: vec![
+                ("bmps/s2.bmp", bmp.clone()),
+                ("bmps/s.log", b"Pixel Size (um)=17.4\n".to_vec()),
+            ],
+            bytes: bmp,
+        },
+    ]
+}
+
+/// AIM's packed kinds with a frame, and an ISQ with its calibration.
+fn scanco() -> Vec<Sample> {
+    let aim = |kind: i32, frame: i64, data: Vec<u8>| {
+        let mut out = b"AIMDATA_V030   \0".to_vec();
+        for size in [40i64, 224, 0, data.len() as i64, 0] {
+            out.extend(size.to_le_bytes());
+        }
+        let mut image = vec![0u8; 224];
+        image[12..16].copy_from_slice(&kind.to_le_bytes());
+        for (a, n) in [5i64, 4, 3].into_iter().enumerate() {
+            image[40 + 8 * a..48 + 8 * a].copy_from_slice(&n.to_le_bytes());
+            image[64 + 8 * a..72 + 8 * a].copy_from_slice(&frame.to_le_bytes());
+            image[184 + 8 * a..192 + 8 * a].copy_from_slice(&20_000i64.to_le_bytes());
+        }
+        [out, image, data].concat()
+    };
+    let bits = [vec![0b0101_1010u8; 3 * 2 * 2], vec![127]].concat();
+    // The frame leaves 3 × 2 × 1 voxels.
+    let runs = [vec![0u8; 8], vec![0, 2, 127, 4]].concat();
+    let mut isq = crate::formats::isq(&[]);
+    isq[508..512].copy_from_slice(&3i32.to_le_bytes());
+    let mut extended = vec![0u8; 512 * 3];
+    extended[16..27].copy_from_slice(b"Calibration");
+    extended[8 + 1176..8 + 1184].copy_from_slice(&[0x9A, 0x46, 0, 0, 0, 0, 0, 0]);
+    vec![
+        alone("bits.aim", aim((6 << 16) + 1, 0, bits)),
+        alone("runs.aim", aim((8 << 16) + 2, 1, runs)),
+        alone("extended.isq", [isq, extended, le_bytes()].concat()),
+    ]
+}
+
+fn tables() -> Vec<Sample> {
+    let manifest = "path,name,group,subject,spacing_mm,lower,upper,otsu,gaussian_voxels\n\
+                    a.nii,left,OA,p1,0.02,200,NA,,0.5\nb.nii,right,,p2,,,,true,\n";
+    let row = bonepd_ct::measure::row::Row {
+        scan: "s".into(),
+        e_app_mpa: Some(12.5),
+        sites: Some(7),
+        ..Default::default()
+    };
+    let results = bonepd_ct::io::table::to_csv(&[row]);
+    let recipe = include_str!("../../pipelines/paper.toml");
+    vec![
+        alone("manifest.csv", manifest.into()),
+        alone("results.csv", results.into_bytes()),
+        alone("recipe.toml", recipe.into()),
+    ]
+}

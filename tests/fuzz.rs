@@ -67,7 +67,7 @@ fn take(target: &Path, spacing_mm: Option<[f64; 3]>) -> bool {
     if let Ok(scan) = &read {
         let grid = scan.volume.grid;
         assert_eq!(grid.len(), scan.volume.as_slice().len());
-        assert!(grid.len() > 0, "an empty scan was read");
+        assert!(!grid.is_empty(), "an empty scan was read");
         assert!(
             grid.spacing_mm.iter().all(|h| h.is_finite() && *h > 0.0),
             "voxel size {:?}",

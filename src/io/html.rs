@@ -201,7 +201,7 @@ fn e_app(report: &Report) -> Table {
 /// A modulus with its stated error; what the error is made of shows on pointing at it.
 fn modulus(line: &Line, model: Model) -> Cell {
     let plain = number(line.modulus(model));
-    let stated = line.errors_mpa(model);
+    let stated = line.stated_errors(model);
     if plain.key.is_none() || stated.iter().all(Option::is_none) {
         return plain;
     }

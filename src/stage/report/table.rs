@@ -31,7 +31,7 @@ pub struct Line {
     /// Stated algebraic and discretisation error of each model's modulus in MPa, by [`Model`]. Not a column: the rows of
     /// `results.csv` hold them.
     #[serde(skip)]
-    errors_mpa: [[Option<f64>; 2]; Model::ALL.len()],
+    pub errors_mpa: [[Option<f64>; 2]; Model::ALL.len()],
 }
 
 impl Line {
@@ -47,7 +47,7 @@ impl Line {
     }
 
     /// Stated algebraic and discretisation error of the modulus in MPa, each where there is one.
-    pub fn errors_mpa(&self, model: Model) -> [Option<f64>; 2] {
+    pub fn stated_errors(&self, model: Model) -> [Option<f64>; 2] {
         self.errors_mpa[model as usize]
     }
 

@@ -1,0 +1,66 @@
+"""ParOSol finds the modulus of voxel FE on the same model: export, its solve, and reading back.
+
+    python3 -m venv venv && venv/bin/pip install parosol-py h5py nibabel
+    cargo build --release
+    venv/bin/python tests/peers/parosol.py
+"""
+
+import csv
+import io
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release/bonepd-ct"
+TOOL = ROOT / "pipelines/parosol.py"
+
+try:
+    import nibabel  # noqa: F401
+    from parosol_py.runner import packaged_executable, run_parosol
+except ImportError as e:
+    sys.exit(f"skipped: {e}; pip install parosol-py h5py nibabel")
+
+
+def ours(*words):
+    subprocess.run([PROGRAM, *map(str, words), "--quiet"], check=True)
+
+
+def tool(*words):
+    done = subprocess.run([sys.executable, TOOL, *map(str, words)], check=True, capture_output=True, text=True)
+    return done.stdout
+
+
+def compare(folder, ends, axis):
+    model = folder / f"{ends}-{axis}.h5"
+    flags = ["--method", "voxel-fe", "--ends", ends, "--axis", axis, "--strain=-0.004", "--tolerance", "1e-8", "--force"]
+    ours("solve", folder / "scan", *flags)
+    with open(folder / "scan/results.csv") as file:
+        row = list(csv.DictReader(file))[-1]
+    tool("export", folder / "scan", model, "--ends", ends, "--axis", axis, "--strain=-0.004")
+    ran = run_parosol([str(packaged_executable()), "--tol", "1e-8", model.name], cwd=folder)
+    if ran.returncode:
+        sys.exit(f"FAILED   ParOSol: {ran.stderr[-500:]}")
+    back = next(csv.DictReader(io.StringIO(tool("read", folder / "scan", model))))
+    expected = float(row["e_app_mpa"])
+    worst = max(abs(float(back[key]) / expected - 1) for key in ("e_app_mpa", "e_app_reaction_mpa"))
+    # ParOSol keeps displacements of the supports in single precision: 6e-8 at best.
+    fine = worst < 1e-5
+    print(f"{'ok      ' if fine else 'FAILED  '} {ends} along {axis}: here {expected:.6f} MPa, ParOSol "
+          f"{float(back['e_app_mpa']):.6f} from the energy, {float(back['e_app_reaction_mpa']):.6f} from the reaction")
+    return fine
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        size = ["--size-mm", "1.0,0.8,1.2", "--spacing-mm", "0.04", "--bvtv", "0.3"]
+        ours("phantom", "-o", folder / "scan.nii.gz", *size)
+        ours("segment", folder / "scan.nii.gz", "-o", folder / "scan", "--lower", "200")
+        fine = [compare(folder, ends, axis) for ends, axis in (("bonded", "z"), ("bonded", "x"), ("free", "z"))]
+    sys.exit(0 if all(fine) else 1)
+
+
+main()

@@ -165,8 +165,9 @@ fn try_all(cases: u32, seed: u64) {
                             sum.refused,
                             sum.peak as f64 / f64::from(1 << 20)
                         );
-                        // A damage that no reader notices tests nothing.
-                        if sum.refused * 10 < cases as usize {
+                        // A damage that no reader notices tests nothing. Text may say something else and still be sound.
+                        let least = if sample.is_table() { 100 } else { 10 };
+                        if sum.refused * least < cases as usize {
                             failed.lock().unwrap().push(format!(
                                 "{}: only {} of {cases} refused",
                                 sample.name, sum.refused

@@ -14,6 +14,13 @@ pub struct Sample {
     pub beside: Vec<(&'static str, Vec<u8>)>,
 }
 
+impl Sample {
+    /// Settings and results, not voxels.
+    pub fn is_table(&self) -> bool {
+        self.name.ends_with(".csv") || self.name.ends_with(".toml")
+    }
+}
+
 fn alone(name: &'static str, bytes: Vec<u8>) -> Sample {
     Sample {
         name,

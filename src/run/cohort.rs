@@ -259,9 +259,19 @@ fn plan(
             job.input.display()
         ));
     }
-    let minutes = estimates.iter().filter_map(|e| e.time_s).sum::<f64>() / 60.0;
+    let seconds = estimates.iter().filter_map(|e| e.time_s).sum::<f64>();
+    let time = match seconds {
+        s if s < 90.0 => format!("{s:.0} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    };
+    let untold = estimates.iter().filter(|e| e.time_s.is_none()).count();
+    let rest = match untold {
+        0 => String::new(),
+        n => format!(", and {n} whose time is not known before reading"),
+    };
     session.say(format!(
-        "scans: {}; about {minutes:.1} min one after the other",
+        "scans: {}; about {time} one after the other{rest}",
         jobs.len()
     ));
     let planned = jobs.iter().zip(estimates);

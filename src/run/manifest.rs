@@ -67,10 +67,10 @@ fn check_header(header: &csv::StringRecord) -> std::result::Result<(), String> {
             let nearest = COLUMNS.iter().max_by(|a, b| {
                 strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b))
             });
-            return Err(format!(
-                "unknown column `{name}`; did you mean `{}`?",
-                nearest.unwrap_or(&"path")
-            ));
+            // Words that are not alike are no help.
+            let alike = nearest.filter(|best| strsim::jaro_winkler(name, best) > 0.75);
+            let advice = alike.map_or(String::new(), |best| format!("; did you mean `{best}`?"));
+            return Err(format!("unknown column `{name}`{advice}"));
         }
     }
     match header.iter().any(|name| name == "path") {

@@ -219,7 +219,6 @@ fn a_million_damaged_files() {
     try_all(cases, number("BONEPD_FUZZ_SEED", 2));
 }
 
-/// Files that are mostly holes: sizes on disk lie, too, but reading costs what they hold.
 #[test]
 fn files_under_a_wrong_name_are_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -231,7 +230,9 @@ fn files_under_a_wrong_name_are_refused() {
     }) {
         let end = |s: &Sample| PathBuf::from(s.name).extension().unwrap().to_owned();
         let path = dir.path().join("a").with_extension(end(b));
-        if end(a) == end(b) || end(b) == "toml" {
+        // Whether a NIfTI file is compressed is told by its first bytes, not by its name.
+        let unpacked = a.name == "a.nii.gz" && end(b) == "nii";
+        if end(a) == end(b) || end(b) == "toml" || unpacked {
             continue;
         }
         std::fs::write(&path, &a.bytes).unwrap();

@@ -1,9 +1,9 @@
 //! Owns what can be told of a scan without reading its voxels: its extent, and whether a TIFF file is a whole stack.
 
-use crate::io::slices;
+use crate::io::{slices, tiff_directories};
 use nifti::NiftiHeader;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Seek};
 use std::path::Path;
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
@@ -49,7 +49,12 @@ pub fn is_stack(path: &Path) -> bool {
 
 /// Width, height, and pages of a TIFF file; an ImageJ stack of one directory tells its pages in its description.
 fn pages(path: &Path) -> Option<[usize; 3]> {
-    let mut decoder = Decoder::new(BufReader::new(File::open(path).ok()?)).ok()?;
+    let mut file = File::open(path).ok()?;
+    if tiff_directories::fault(&file).is_some() {
+        return None;
+    }
+    file.rewind().ok()?;
+    let mut decoder = Decoder::new(BufReader::new(file)).ok()?;
     let (width, height) = decoder.dimensions().ok()?;
     let description = decoder.get_tag_ascii_string(Tag::ImageDescription);
     let stated = description.ok().and_then(|text| {

@@ -28,4 +28,5 @@ pub mod specimen;
 pub mod stiffness;
 pub mod table;
 pub mod tiff;
+mod tiff_directories;
 pub mod vtk;

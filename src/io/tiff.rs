@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::io::raw::{self, Layout, Scalar};
 use crate::io::scan::Stored;
 use crate::io::slices::{self, Slice};
+use crate::io::tiff_directories;
 use crate::volume::Volume;
 use std::fs::File;
 use std::io::{BufReader, Seek, SeekFrom};
@@ -33,6 +34,15 @@ fn open(path: &Path) -> Result<Pages> {
     };
     let file = File::open(path).map_err(unreadable)?;
     let file_bytes = file.metadata().map_err(unreadable)?.len();
+    if let Some(fault) = tiff_directories::fault(&file) {
+        return Err(Error::file(
+            path,
+            format!("is no sound TIFF file: {fault}"),
+            DAMAGED,
+        ));
+    }
+    let mut file = file;
+    file.rewind().map_err(unreadable)?;
     let mut limits = Limits::default();
     limits.decoding_buffer_size = PAGE_BYTES as usize;
     limits.intermediate_buffer_size = PAGE_BYTES as usize;

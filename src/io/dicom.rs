@@ -160,6 +160,14 @@ fn head(path: &Path) -> Result<Head> {
             ADVICE,
         ));
     };
+    // The decoder takes these for granted.
+    if !count(0x0028, 0x0101).is_some_and(|bits| (1..=32).contains(&bits)) {
+        return Err(Error::file(
+            path,
+            "holds no image: Bits Stored should be 1 to 32",
+            ADVICE,
+        ));
+    }
     let positive = |v: &f64| *v > 0.0;
     Ok(Head {
         path: path.to_path_buf(),

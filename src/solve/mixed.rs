@@ -2,7 +2,7 @@
 //!
 //! The displacements are in double precision, residual, direction and their images in single. What single precision
 //! loses is had back by making the residual anew from the displacements, in double precision, whenever it has fallen
-//! by [`REPLACE`] (van der Vorst & Ye 2000); so any accuracy is reached that double precision allows.
+//! by a thousand (van der Vorst & Ye 2000); so any accuracy is reached that double precision allows.
 
 use crate::operator::SinglePreconditioner;
 use crate::operator::coarsen::Coarsen;

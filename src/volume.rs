@@ -67,6 +67,8 @@ pub struct Specimen {
     pub tv_mm3: f64,
     /// How TV was defined, in words ("box", "cylinder d=10 mm", "mask FILE").
     pub tv_definition: String,
+    /// Values of the scan, on the mask's grid, where its tissue is to differ from voxel to voxel; not read in pores.
+    pub grey: Option<Volume<f32>>,
 }
 
 impl Specimen {

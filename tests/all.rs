@@ -20,4 +20,5 @@ mod segment;
 mod stability;
 mod stiffness;
 mod stopped;
+mod tissue;
 mod voxel_fe;

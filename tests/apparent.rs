@@ -29,6 +29,7 @@ fn specimen(bone: Volume<u8>) -> Specimen {
         bone,
         tv_mm3,
         tv_definition: "box".into(),
+        grey: None,
     }
 }
 

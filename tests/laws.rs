@@ -43,6 +43,7 @@ pub fn irregular_specimen() -> Specimen {
         bone,
         tv_mm3,
         tv_definition: "box".into(),
+        grey: None,
     }
 }
 

@@ -22,6 +22,7 @@ fn block() -> Specimen {
         bone,
         tv_mm3: 0.512,
         tv_definition: "box".into(),
+        grey: None,
     }
 }
 

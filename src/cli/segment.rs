@@ -41,6 +41,9 @@ pub struct SegmentSettings {
     /// Otsu's threshold instead of a window
     #[arg(long, conflicts_with_all = ["lower", "upper"])]
     otsu: bool,
+    /// Of a labelled scan: the values that are bone, comma-separated (100,127), instead of a threshold
+    #[arg(long, value_name = "VALUES", value_delimiter = ',', conflicts_with_all = ["lower", "upper", "otsu", "gaussian"])]
+    labels: Vec<i32>,
     /// Smooth with a Gaussian of this σ in voxels before the threshold [default: off]
     #[arg(long, value_name = "VOXELS", value_parser = words::number)]
     gaussian: Option<f64>,
@@ -54,6 +57,9 @@ pub struct SegmentSettings {
     /// Keep every voxel, not only the largest connected piece
     #[arg(long)]
     keep_all: bool,
+    /// Also keep the grey values of bone in DIR/grey.nii.gz, for moduli that follow them (`solve --material`)
+    #[arg(long)]
+    keep_grey: bool,
     /// Also measure Tb.Th and Tb.Sp (sphere fitting) and Conn.D; takes longer
     #[arg(long)]
     morphometry: bool,
@@ -68,6 +74,15 @@ impl SegmentSettings {
         if self.lower.is_some() || self.upper.is_some() {
             params.otsu = false;
         }
+        if self.otsu || self.lower.is_some() || self.upper.is_some() {
+            params.labels.clear();
+        }
+        if !self.labels.is_empty() {
+            (params.otsu, params.lower, params.upper) = (false, None, None);
+            params.gaussian_voxels = 0.0;
+            params.labels.clone_from(&self.labels);
+        }
+        params.keep_grey |= self.keep_grey;
         params.spacing_mm = self.spacing.or(params.spacing_mm);
         params.units = self.units.unwrap_or(params.units);
         params.lower = self.lower.or(params.lower);

@@ -4,6 +4,7 @@ use super::lattice::LatticeSettings;
 use super::{print_json, words};
 use bonepd_ct::error::{Error, Result};
 use bonepd_ct::grid::Axis;
+use bonepd_ct::physics::material::{Law, Material};
 use bonepd_ct::run::Outcome;
 use bonepd_ct::run::session::Session;
 use bonepd_ct::stage::solve::{Conditions, Ends, Load, Method, SolveParams};
@@ -43,6 +44,17 @@ pub struct SolveSettings {
     /// Poisson's ratio of the bone tissue, below 0.5 [default: 0.3]
     #[arg(long, value_name = "NU", value_parser = words::number, allow_negative_numbers = true)]
     poisson: Option<f64>,
+    /// Moduli that differ from voxel to voxel: labels:100=6829/0.3,127=10000 (E, and ν if another), power:C,N (E = C·ρ^N),
+    /// linear:A,B (E = A·ρ + B), homminga:FULL[,N] (E = young-mpa·(ρ/FULL)^N, N 1.7); ρ are the scan's values. Needs
+    /// `segment --keep-grey` or `--labels`
+    #[arg(long, value_name = "LAW", value_parser = words::material)]
+    material: Option<Law>,
+    /// Density of the law is SLOPE·value + INTERCEPT [default: the scan's values]
+    #[arg(long, value_name = "SLOPE,INTERCEPT", value_parser = words::pair, allow_hyphen_values = true)]
+    density: Option<[f64; 2]>,
+    /// Raise smaller moduli of a law to this
+    #[arg(long, value_name = "E", value_parser = words::positive)]
+    least_mpa: Option<f64>,
     /// Nominal strain; negative is compression [default: -0.01]
     #[arg(long, value_name = "S", value_parser = words::number, allow_negative_numbers = true)]
     strain: Option<f64>,
@@ -95,6 +107,23 @@ impl SolveSettings {
         params.refine = self.refine.map_or(params.refine, usize::from);
         params.coarsen = self.coarsen.map_or(params.coarsen, usize::from);
         params.mechanisms |= self.mechanisms;
+        if let Some(law) = &self.material {
+            params.material = Some(Material::new(law.clone()));
+        }
+        match &mut params.material {
+            Some(material) => {
+                material.density = self.density.unwrap_or(material.density);
+                material.least_mpa = self.least_mpa.or(material.least_mpa);
+            }
+            None if self.density.is_some() || self.least_mpa.is_some() => {
+                return Err(Error::setting(
+                    "--density, --least-mpa",
+                    "they belong to a law of moduli, and none is given",
+                    "add --material, or leave them out",
+                ));
+            }
+            None => {}
+        }
         self.refuse_unavailable()?;
         params.check()
     }

@@ -1,5 +1,6 @@
 //! Owns the words of the command line: lists, percentages, crops, choices; from text to plain values.
 
+use bonepd_ct::physics::material::{Label, Law};
 use bonepd_ct::stage::segment::Voi;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
@@ -46,6 +47,57 @@ pub fn triple(word: &str) -> Result<[f64; 3], String> {
     parts
         .try_into()
         .map_err(|_| format!("expected three numbers X,Y,Z, found `{word}`"))
+}
+
+/// `A,B`.
+pub fn pair(word: &str) -> Result<[f64; 2], String> {
+    let parts: Vec<f64> = word.split(',').map(number).collect::<Result<_, _>>()?;
+    parts
+        .try_into()
+        .map_err(|_| format!("expected two numbers A,B, found `{word}`"))
+}
+
+/// `labels:VALUE=E[/NU],…`, `power:C,N`, `linear:A,B`, `homminga:FULL[,N]`.
+pub fn material(word: &str) -> Result<Law, String> {
+    let wrong = || {
+        format!(
+            "expected labels:VALUE=E[/NU],…, power:C,N, linear:A,B or homminga:FULL[,N], found `{word}`"
+        )
+    };
+    let (name, rest) = word.split_once(':').ok_or_else(wrong)?;
+    if name == "labels" {
+        let labels: Result<Vec<Label>, String> = rest.split(',').map(label).collect();
+        return Ok(Law::Labels(labels?));
+    }
+    let parts: Vec<f64> = rest.split(',').map(number).collect::<Result<_, _>>()?;
+    match (name, &parts[..]) {
+        ("power", &[coefficient, exponent]) => Ok(Law::Power {
+            coefficient,
+            exponent,
+        }),
+        ("linear", &[slope, intercept]) => Ok(Law::Linear { slope, intercept }),
+        ("homminga", &[full]) => Ok(Law::Homminga {
+            full,
+            exponent: 1.7,
+        }),
+        ("homminga", &[full, exponent]) => Ok(Law::Homminga { full, exponent }),
+        _ => Err(wrong()),
+    }
+}
+
+fn label(word: &str) -> Result<Label, String> {
+    let wrong = || format!("expected VALUE=E or VALUE=E/NU, found `{word}`");
+    let (value, moduli) = word.split_once('=').ok_or_else(wrong)?;
+    let value = value.trim().parse().map_err(|_| wrong())?;
+    let (young, poisson) = match moduli.split_once('/') {
+        Some((young, poisson)) => (young, Some(number(poisson)?)),
+        None => (moduli, None),
+    };
+    Ok(Label {
+        value,
+        young_mpa: positive(young)?,
+        poisson,
+    })
 }
 
 /// `H` or `X,Y,Z`, all above zero.

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 pub const MASK: &str = "mask.nii.gz";
 pub const RECORD: &str = "segment.json";
+pub const GREY: &str = "grey.nii.gz";
 pub const PICTURE: &str = "segment.png";
 
 /// `segment.json`: what was segmented, how, and what came out; enough to repeat it.
@@ -37,8 +38,12 @@ pub struct Input {
 }
 
 /// Writes mask and record. The record goes last: where it is, the mask is whole.
-pub fn write(dir: &Path, bone: &Volume<u8>, record: &SegmentRecord) -> Result<()> {
-    nifti::write(&dir.join(MASK), bone)?;
+pub fn write(dir: &Path, specimen: &Specimen, record: &SegmentRecord) -> Result<()> {
+    nifti::write(&dir.join(MASK), &specimen.bone)?;
+    match &specimen.grey {
+        Some(grey) => nifti::write(&dir.join(GREY), grey)?,
+        None => drop(std::fs::remove_file(dir.join(GREY))),
+    }
     let json = serde_json::to_string_pretty(record).expect("records are plain data");
     atomic::write(&dir.join(RECORD), json + "\n")
 }
@@ -79,7 +84,28 @@ pub fn load(dir: &Path) -> Result<Specimen> {
         bone: mask_of(&stored.volume),
         tv_mm3: record.results.tv_mm3,
         tv_definition: record.results.tv_definition,
+        grey: None,
     })
+}
+
+/// The values of bone voxels that `segment` kept in `dir`; None where it was not asked to.
+pub fn load_grey(dir: &Path, bone: &Volume<u8>) -> Result<Option<Volume<f32>>> {
+    let path = dir.join(GREY);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let grey = scan::read(&path, Some(bone.grid.spacing_mm))?.volume;
+    if grey.grid.n != bone.grid.n {
+        return Err(Error::file(
+            &path,
+            format!(
+                "has {:?} voxels where the mask has {:?}",
+                grey.grid.n, bone.grid.n
+            ),
+            "segment the scan again",
+        ));
+    }
+    Ok(Some(grey))
 }
 
 /// A mask from any image: non-zero is inside.

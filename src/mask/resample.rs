@@ -26,6 +26,15 @@ pub fn refine(mask: &Volume<u8>, factor: usize) -> Volume<u8> {
 /// Bone fractions (0 to 1) of voxels `factor` times as long. Where an axis is not a multiple, its voxels are stretched
 /// a little less, so that the box stays what it is; a fine voxel across two coarse ones counts in both by its share.
 pub fn coarsen(mask: &Volume<u8>, factor: usize) -> Volume<f32> {
+    coarsened(mask, factor, |_| 1.0)
+}
+
+/// Means over the same coarse voxels of a value that is `values` in bone and 0 in pores.
+pub fn coarsen_values(mask: &Volume<u8>, factor: usize, values: &[f32]) -> Volume<f32> {
+    coarsened(mask, factor, |voxel| values[voxel])
+}
+
+fn coarsened(mask: &Volume<u8>, factor: usize, value: impl Fn(usize) -> f32 + Sync) -> Volume<f32> {
     let fine = mask.grid;
     let n: [usize; 3] = std::array::from_fn(|a| fine.n[a].div_ceil(factor));
     let shares: [Vec<Vec<(usize, f32)>>; 3] = std::array::from_fn(|a| shares(fine.n[a], n[a]));
@@ -38,9 +47,10 @@ pub fn coarsen(mask: &Volume<u8>, factor: usize) -> Volume<f32> {
             for (i, out) in plane.iter_mut().enumerate() {
                 for &(fz, wz) in &shares[2][z] {
                     for &(fy, wy) in &shares[1][i / n[0]] {
-                        let row = &voxels[(fz * fine.n[1] + fy) * fine.n[0]..][..fine.n[0]];
+                        let start = (fz * fine.n[1] + fy) * fine.n[0];
                         let across = shares[0][i % n[0]].iter();
-                        let sum: f32 = across.filter(|s| row[s.0] != 0).map(|s| s.1).sum();
+                        let bone = across.filter(|s| voxels[start + s.0] != 0);
+                        let sum: f32 = bone.map(|s| s.1 * value(start + s.0)).sum();
                         *out += wz * wy * sum;
                     }
                 }

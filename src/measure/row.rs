@@ -55,4 +55,6 @@ pub struct Row {
     pub subject: Option<String>,
     /// Motions that cost next to no energy, rigid motions of the whole apart; where `--mechanisms` asks for them.
     pub mechanisms: Option<u64>,
+    /// The law by which tissue differs from voxel to voxel; `young_mpa` is then the bone's mean.
+    pub material: Option<String>,
 }

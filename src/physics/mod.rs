@@ -7,3 +7,4 @@ pub mod growth;
 pub mod hex8;
 pub mod hyperelastic;
 pub mod lattice;
+pub mod material;

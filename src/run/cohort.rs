@@ -51,7 +51,9 @@ pub fn cohort(
     resources: &Resources,
     session: &Session,
 ) -> Result<(Outcome, Vec<ScanResult>)> {
-    let jobs = scans::find(inputs, &recipe.segment, selection, session)?;
+    let mut segment = recipe.segment.clone();
+    segment.keep_grey |= recipe.solve.material.is_some();
+    let jobs = scans::find(inputs, &segment, selection, session)?;
     let estimates: Vec<Estimate> = jobs
         .iter()
         .map(|job| estimate(&job.input, job.segment.spacing_mm, recipe))

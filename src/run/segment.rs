@@ -85,6 +85,7 @@ fn up_to_date(
         && kept.input.voi_blake3 == *voi_blake3
         && dir.join(specimen::MASK).is_file()
         && dir.join(specimen::PICTURE).is_file()
+        && (!params.keeps_grey() || dir.join(specimen::GREY).is_file())
 }
 
 fn write(
@@ -101,7 +102,7 @@ fn write(
         Some(crop) => picture::write(&picture_path, &scan.cropped(crop), &specimen.bone)?,
         None => picture::write(&picture_path, scan, &specimen.bone)?,
     }
-    specimen::write(dir, &specimen.bone, record)
+    specimen::write(dir, specimen, record)
 }
 
 fn say(record: &SegmentRecord, session: &Session) {

@@ -13,6 +13,7 @@ use crate::run::session::Session;
 use crate::run::stiffness;
 use crate::solve::cg::CgStep;
 use crate::stage::lattice::{Case, LatticeParams};
+use crate::stage::solve::tissue::Tissue;
 use crate::stage::solve::{Load, Method, SolveParams, lattice, voxel_fe};
 use crate::volume::Specimen;
 use indicatif::ProgressBar;
@@ -32,7 +33,13 @@ pub fn solve(
 ) -> Result<Vec<Row>> {
     lattices.check()?;
     params.check()?;
-    let specimen = load(dir)?;
+    let mut specimen = load(dir)?;
+    if params.material.is_some() {
+        specimen.grey = specimen::load_grey(dir, &specimen.bone)?;
+    }
+    let tissue = Tissue::of(&specimen, params)?;
+    let settings = tissue.label(params.row(&specimen), params);
+    drop(tissue);
     if params.method == Method::Lattice {
         warn_of_coarse(dir, lattices, session);
     }
@@ -42,7 +49,7 @@ pub fn solve(
     for job in jobs(lattices, params) {
         let settings = Row {
             mean_thickness_mm,
-            ..params.row(&specimen)
+            ..settings.clone()
         };
         let blank = job.label(&specimen, params, settings);
         let kept = results.find(&blank, params);

@@ -7,6 +7,7 @@ pub use crate::topology::placement::Boundary;
 use crate::topology::placement::{Frame, weigh};
 use crate::topology::sites::{Grips, Sites};
 pub use crate::topology::stencil::Structure;
+use crate::topology::tissue::stiffen;
 use crate::volume::Specimen;
 use serde::{Deserialize, Serialize};
 
@@ -109,8 +110,22 @@ impl Case {
 /// # Errors
 /// A lattice parameter or grip that does not fit the specimen.
 pub fn build(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<Sites> {
+    build_of(specimen, None, case, axis, grip_mm)
+}
+
+/// The same where tissue differs: `tissue` is each voxel's modulus over that of the lattice, not read in pores.
+pub fn build_of(
+    specimen: &Specimen,
+    tissue: Option<&[f32]>,
+    case: &Case,
+    axis: Axis,
+    grip_mm: f64,
+) -> Result<Sites> {
     let (frame, grips) = lay(specimen, case, axis, grip_mm)?;
-    let weights = weigh(&frame, &specimen.bone, case.boundary);
+    let mut weights = weigh(&frame, &specimen.bone, case.boundary);
+    if let Some(tissue) = tissue {
+        stiffen(&frame, &specimen.bone, tissue, &mut weights);
+    }
     Ok(Sites::connect(frame, &weights, grips))
 }
 

@@ -11,4 +11,5 @@ pub mod placement;
 pub mod plane;
 pub mod sites;
 pub mod stencil;
+pub mod tissue;
 pub mod voxels;

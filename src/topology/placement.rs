@@ -1,6 +1,6 @@
 //! Owns where lattice sites sit in a specimen and which of them exist: the floppy, firm and graded rules.
 
-mod near_bone;
+pub(super) mod near_bone;
 
 use crate::error::{Error, Result};
 use crate::grid::{Axis, Grid};

@@ -13,7 +13,7 @@ pub struct Sites {
     pub indices: Vec<[i32; 3]>,
     /// A missing neighbour is the site itself (its bond then stretches by nothing).
     pub neighbours: Neighbours,
-    /// Share of a whole site's stiffness, only where sites differ (graded).
+    /// Stiffness over that of a whole site of the lattice's tissue, only where sites differ (graded, mixed tissue).
     pub weights: Option<Vec<f64>>,
     /// Planes (indices along the load axis) up to which, and from which, sites are gripped.
     pub grips: Grips,
@@ -69,7 +69,7 @@ impl Sites {
                 .filter(|&n| n != u32::MAX)
         });
         drop(number);
-        let graded = weights.iter().any(|&w| w > 0.0 && w < 1.0);
+        let graded = weights.iter().any(|&w| w > 0.0 && w != 1.0);
         let weights = graded.then(|| kept.iter().map(|&c| f64::from(weights[c])).collect());
         Sites {
             frame,

@@ -34,6 +34,7 @@ fn phantom(n: usize, wave: f64, solid: f64) -> Specimen {
         tv_mm3: grid.size_mm().iter().product(),
         bone: Volume::from_vec(grid, voxels),
         tv_definition: "box".into(),
+        grey: None,
     }
 }
 

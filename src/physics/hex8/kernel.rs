@@ -117,80 +117,96 @@ pub fn low_corner(rows: &[u32; 9], i: usize, e: usize) -> usize {
     rows[y + 3 * z] as usize + i + x - 1
 }
 
+/// Elements that differ: a factor each, and a kind each where there is more than one table of stencils.
+#[derive(Clone, Copy)]
+pub struct Elements<'a> {
+    pub mesh: &'a VoxelMesh,
+    pub factor: &'a [f32],
+    pub kind: &'a [u8],
+}
+
 /// [`rows_f64`] with a factor per element.
 pub fn graded_f64(
-    mesh: &VoxelMesh,
-    table: &Stencils<f64>,
-    factor: &[f32],
+    tables: &[Stencils<f64>],
+    elements: Elements,
     nodes: Range<usize>,
     x: &[[f64; 3]],
     y: &mut [[f64; 3]],
 ) {
-    let field = Field { mesh, factor, x };
     match simd::isa() {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has what the function asks for.
-        Isa::Avx512 => unsafe { graded_avx512(table, field, nodes, y) },
+        Isa::Avx512 => unsafe { graded_avx512(tables, elements, nodes, x, y) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Isa::Avx2 => unsafe { graded_avx2_f64(table, field, nodes, y) },
-        _ => gather_graded::<simd::PlainF64>(table, field, nodes, y),
+        Isa::Avx2 => unsafe { graded_avx2_f64(tables, elements, nodes, x, y) },
+        _ => gather_graded::<simd::PlainF64>(tables, elements, nodes, x, y),
     }
 }
 
 /// The same in single precision.
 pub fn graded_f32(
-    mesh: &VoxelMesh,
-    table: &Stencils<f32>,
-    factor: &[f32],
+    tables: &[Stencils<f32>],
+    elements: Elements,
     nodes: Range<usize>,
     x: &[[f32; 3]],
     y: &mut [[f32; 3]],
 ) {
-    let field = Field { mesh, factor, x };
     match simd::isa() {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has what the function asks for.
-        Isa::Avx512 | Isa::Avx2 => unsafe { graded_avx2_f32(table, field, nodes, y) },
-        _ => gather_graded::<simd::PlainF32>(table, field, nodes, y),
+        Isa::Avx512 | Isa::Avx2 => unsafe { graded_avx2_f32(tables, elements, nodes, x, y) },
+        _ => gather_graded::<simd::PlainF32>(tables, elements, nodes, x, y),
     }
-}
-
-/// What a graded row reads.
-#[derive(Clone, Copy)]
-struct Field<'a, S> {
-    mesh: &'a VoxelMesh,
-    factor: &'a [f32],
-    x: &'a [[S; 3]],
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx2,fma")]
-fn graded_avx512(t: &Stencils<f64>, f: Field<f64>, n: Range<usize>, y: &mut [[f64; 3]]) {
-    gather_graded::<simd::Avx512F64>(t, f, n, y);
+fn graded_avx512(
+    t: &[Stencils<f64>],
+    e: Elements,
+    n: Range<usize>,
+    x: &[[f64; 3]],
+    y: &mut [[f64; 3]],
+) {
+    gather_graded::<simd::Avx512F64>(t, e, n, x, y);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn graded_avx2_f64(t: &Stencils<f64>, f: Field<f64>, n: Range<usize>, y: &mut [[f64; 3]]) {
-    gather_graded::<simd::Avx2F64>(t, f, n, y);
+fn graded_avx2_f64(
+    t: &[Stencils<f64>],
+    e: Elements,
+    n: Range<usize>,
+    x: &[[f64; 3]],
+    y: &mut [[f64; 3]],
+) {
+    gather_graded::<simd::Avx2F64>(t, e, n, x, y);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn graded_avx2_f32(t: &Stencils<f32>, f: Field<f32>, n: Range<usize>, y: &mut [[f32; 3]]) {
-    gather_graded::<simd::Avx2F32>(t, f, n, y);
+fn graded_avx2_f32(
+    t: &[Stencils<f32>],
+    e: Elements,
+    n: Range<usize>,
+    x: &[[f32; 3]],
+    y: &mut [[f32; 3]],
+) {
+    gather_graded::<simd::Avx2F32>(t, e, n, x, y);
 }
 
 #[inline(always)]
 fn gather_graded<L: Lanes<S: From<f32>>>(
-    table: &Stencils<L::S>,
-    field: Field<L::S>,
+    tables: &[Stencils<L::S>],
+    elements: Elements,
     nodes: Range<usize>,
+    x: &[[L::S; 3]],
     y: &mut [[L::S; 3]],
 ) {
-    let Field { mesh, factor, x } = field;
+    let Elements { mesh, factor, kind } = elements;
     assert!(x.len() == mesh.len() && factor.len() == mesh.len());
+    assert!(kind.is_empty() || kind.len() == mesh.len());
     assert!(nodes.end <= x.len() && y.len() == nodes.len());
     for segment in mesh.segments_in(nodes.clone()) {
         let own = segment.nodes();
@@ -198,7 +214,7 @@ fn gather_graded<L: Lanes<S: From<f32>>>(
         let out = &mut y[own.start - nodes.start..own.end - nodes.start];
         for (i, (&around, out)) in around.iter().zip(out).enumerate() {
             // SAFETY: as for equal elements; a row of elements reads two of the same rows and nodes.
-            *out = unsafe { graded_node::<L>(table, around, factor, &segment.rows, i, x) };
+            *out = unsafe { graded_node::<L>(tables, around, elements, &segment.rows, i, x) };
         }
     }
 }
@@ -207,9 +223,9 @@ fn gather_graded<L: Lanes<S: From<f32>>>(
 /// `1 <= rows[r] + i < x.len() − 1` for every row that an element around the node reaches.
 #[inline(always)]
 unsafe fn graded_node<L: Lanes<S: From<f32>>>(
-    table: &Stencils<L::S>,
+    tables: &[Stencils<L::S>],
     around: u8,
-    factor: &[f32],
+    elements: Elements,
     rows: &[u32; 9],
     i: usize,
     x: &[[L::S; 3]],
@@ -217,7 +233,9 @@ unsafe fn graded_node<L: Lanes<S: From<f32>>>(
     unsafe {
         let (mut a, mut b, mut c, mut four) = (L::zero(), L::zero(), L::zero(), L::zero4());
         for e in (0..8).filter(|e| around >> e & 1 == 1) {
-            let stencil = table.stencil(1 << e);
+            let low = low_corner(rows, i, e);
+            let kind = elements.kind.get(low).map_or(0, |&k| k as usize);
+            let stencil = tables[kind].stencil(1 << e);
             let (mut p, mut q, mut s, mut t) = (L::zero(), L::zero(), L::zero(), L::zero4());
             for k in 0..4 {
                 let r = (e >> 1 & 1) + (k & 1) + 3 * ((e >> 2) + (k >> 1));
@@ -229,7 +247,7 @@ unsafe fn graded_node<L: Lanes<S: From<f32>>>(
                 s = s.fma(L::load(m.add(16)), u);
                 t = L::fma4(t, stencil.as_ptr().add(NINTH + 4 * r), first.add(8));
             }
-            let f = L::S::from(factor[low_corner(rows, i, e)]);
+            let f = L::S::from(elements.factor[low]);
             let wide = L::splat(f);
             a = a.fma(wide, p);
             b = b.fma(wide, q);

@@ -63,15 +63,7 @@ impl Operator<3> for Hex8 {
 
 impl Coarsen for Hex8 {
     fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
-        let h = self.mesh.grid.spacing_mm;
-        for segment in self.mesh.segments_in(sites.clone()) {
-            let own = segment.nodes();
-            let out = &mut x[own.start - sites.start..own.end - sites.start];
-            for (i, x) in (0u32..).zip(out) {
-                let at = [segment.at[0] + i, segment.at[1], segment.at[2]];
-                *x = std::array::from_fn(|a| f64::from(at[a]) * h[a]);
-            }
-        }
+        positions(&self.mesh, sites, x);
     }
 
     fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
@@ -104,6 +96,19 @@ impl Coarsen for Hex8 {
 
     fn eigenvalue_bound(&self) -> f64 {
         self.eigenvalue_bound
+    }
+}
+
+/// Where nodes are, in mm.
+fn positions(mesh: &VoxelMesh, sites: Range<usize>, x: &mut [[f64; 3]]) {
+    let h = mesh.grid.spacing_mm;
+    for segment in mesh.segments_in(sites.clone()) {
+        let own = segment.nodes();
+        let out = &mut x[own.start - sites.start..own.end - sites.start];
+        for (i, x) in (0u32..).zip(out) {
+            let at = [segment.at[0] + i, segment.at[1], segment.at[2]];
+            *x = std::array::from_fn(|a| f64::from(at[a]) * h[a]);
+        }
     }
 }
 
@@ -167,6 +172,39 @@ mod tests {
         op.rows_f32(0..x.len(), &x32, &mut y32);
         let y: Vec<[f64; 3]> = y32.iter().map(|v| v.map(f64::from)).collect();
         assert!(worst(&exact, &y) < 3e-6 * scale);
+    }
+
+    /// Elements of two Poisson's ratios apply what two meshes do, each with the other's elements of no stiffness.
+    #[test]
+    fn elements_of_two_kinds_have_their_own_ratio_each() {
+        let rule = Integration::Full;
+        let kinds = [(0.3, rule), (0.45, Integration::MeanDilatation)];
+        let second = |e: usize| e % 3 == 0;
+        let mesh = random([11, 7, 6], 50, 5).mesh;
+        let x = vector(mesh.len());
+        let mixed =
+            graded::Graded::of_kinds(mesh.clone(), 1000.0, &kinds, factor, |e| second(e).into());
+        check_rows(&mixed);
+        let mut exact = vec![[0.0; 3]; x.len()];
+        for (kind, &(nu, rule)) in kinds.iter().enumerate() {
+            let own = |e: usize| {
+                if usize::from(second(e)) == kind {
+                    factor(e)
+                } else {
+                    0.0
+                }
+            };
+            let part = graded::Graded::new(mesh.clone(), 1000.0, nu, rule, own);
+            let mut y = vec![[0.0; 3]; x.len()];
+            part.apply(&x, &mut y);
+            for (sum, y) in exact.iter_mut().zip(&y) {
+                (0..3).for_each(|a| sum[a] += y[a]);
+            }
+        }
+        let scale = exact.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+        let mut y = vec![[0.0; 3]; x.len()];
+        mixed.apply(&x, &mut y);
+        assert!(worst(&exact, &y) < 1e-13 * scale);
     }
 
     #[test]

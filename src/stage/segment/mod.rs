@@ -13,7 +13,7 @@ use crate::measure::thickness::plate_thickness_mm;
 use crate::volume::{Specimen, Volume};
 use region::{check_crop, inside};
 use serde::{Deserialize, Serialize};
-use window::{count, grey_range, nothing_selected, select, window};
+use window::{count, grey_range, labelled, no_label, nothing_selected, of_bone, select, window};
 
 /// What segmentation found, as plain numbers; the results part of `segment.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,7 +23,7 @@ pub struct SegmentSummary {
     /// The window in use, in the image's units; Otsu's threshold is a lower bound.
     pub lower: Option<f64>,
     pub upper: Option<f64>,
-    /// `window` or `otsu`.
+    /// `window`, `otsu` or `labels`.
     pub threshold: String,
     /// Range of the finite grey values before smoothing.
     pub grey_min: f64,
@@ -65,11 +65,12 @@ pub fn segment(
     voi_mask: Option<&Volume<u8>>,
 ) -> Result<Segmented> {
     params.check()?;
-    if !params.otsu && params.lower.is_none() && params.upper.is_none() {
+    let threshold = params.otsu || params.lower.is_some() || params.upper.is_some();
+    if !threshold && params.labels.is_empty() {
         return Err(Error::setting(
             "lower",
             "no threshold given",
-            "give --lower (and --upper), or --otsu",
+            "give --lower (and --upper), --otsu, or the --labels of a segmented scan",
         ));
     }
     let cropped;
@@ -86,8 +87,14 @@ pub fn segment(
     let (inside, tv_definition) = inside(&params.voi, scan.grid, voi_mask.as_ref(), corner_mm)?;
     let grey = grey_range(scan)?;
     let (lower, upper) = window(scan, params, &grey)?;
-    let mut bone = select(scan, params.gaussian_voxels, &grey, lower, upper);
+    let mut bone = match params.labels.is_empty() {
+        true => select(scan, params.gaussian_voxels, &grey, lower, upper),
+        false => labelled(scan, &params.labels),
+    };
     let selected = count(&bone);
+    if selected == 0 && !params.labels.is_empty() {
+        return Err(no_label(scan, &params.labels));
+    }
     if selected == 0 {
         return Err(nothing_selected(lower, upper, &grey));
     }
@@ -110,6 +117,7 @@ pub fn segment(
     let tv_mm3 = inside.tv_mm3(&scan.grid);
     let specimen = Specimen {
         name: name.into(),
+        grey: params.keeps_grey().then(|| of_bone(scan, &bone)),
         bone,
         tv_mm3,
         tv_definition,
@@ -119,7 +127,7 @@ pub fn segment(
         spacing_mm: scan.grid.spacing_mm,
         lower,
         upper,
-        threshold: if params.otsu { "otsu" } else { "window" }.into(),
+        threshold: params.threshold().into(),
         grey_min: f64::from(grey.min),
         grey_max: f64::from(grey.max),
         non_finite_voxels: grey.non_finite,

@@ -45,6 +45,8 @@ pub struct SegmentParams {
     pub upper: Option<f64>,
     /// Otsu's threshold instead of a window.
     pub otsu: bool,
+    /// Of a labelled scan: the values that are bone, instead of a window.
+    pub labels: Vec<i32>,
     /// σ of a Gaussian in voxels; 0 is off.
     pub gaussian_voxels: f64,
     pub voi: Voi,
@@ -52,6 +54,8 @@ pub struct SegmentParams {
     pub crop: Option<[[usize; 2]; 3]>,
     /// Keep every voxel, not only the largest 6-connected component.
     pub keep_all: bool,
+    /// Also keep the values of bone voxels, for moduli that follow them.
+    pub keep_grey: bool,
     /// Also measure Tb.Th, Tb.Sp and Conn.D of the mask.
     pub morphometry: bool,
 }
@@ -60,6 +64,20 @@ pub struct SegmentParams {
 const MAX_SIGMA: f64 = 20.0;
 
 impl SegmentParams {
+    /// In a word, how bone is told.
+    pub fn threshold(&self) -> &'static str {
+        match self.labels.is_empty() {
+            false => "labels",
+            true if self.otsu => "otsu",
+            true => "window",
+        }
+    }
+
+    /// Whether the values of bone voxels are kept beside the mask.
+    pub fn keeps_grey(&self) -> bool {
+        self.keep_grey || !self.labels.is_empty()
+    }
+
     /// Refuses settings that contradict each other or cannot be used on any scan.
     pub fn check(&self) -> Result<()> {
         let refuse =
@@ -69,6 +87,14 @@ impl SegmentParams {
                 "segment.otsu",
                 "Otsu's threshold and a window (lower, upper) exclude each other".to_owned(),
                 "give one of them",
+            );
+        }
+        let threshold = self.otsu || self.lower.is_some() || self.upper.is_some();
+        if !self.labels.is_empty() && (threshold || self.gaussian_voxels > 0.0) {
+            return refuse(
+                "segment.labels",
+                "labels of a segmented scan go with no threshold and no smoothing".to_owned(),
+                "leave out lower, upper, otsu and gaussian, or the labels",
             );
         }
         if let (Some(lower), Some(upper)) = (self.lower, self.upper)

@@ -133,3 +133,43 @@ pub(super) fn nothing_selected(lower: Option<f64>, upper: Option<f64>, grey: &Gr
         "choose a window inside that range (image's own units), or --otsu",
     )
 }
+
+/// 1 where the value is one of the labels.
+pub(super) fn labelled(scan: &Volume<f32>, labels: &[i32]) -> Volume<u8> {
+    let labels: Vec<f32> = labels.iter().map(|&l| l as f32).collect();
+    let voxels = scan.as_slice().par_iter();
+    let bone = voxels.map(|v| u8::from(labels.contains(v))).collect();
+    let mut mask = Volume::from_vec(scan.grid, bone);
+    mask.affine = scan.affine;
+    mask
+}
+
+pub(super) fn no_label(scan: &Volume<f32>, labels: &[i32]) -> Error {
+    let mut found: Vec<f32> = Vec::new();
+    for &v in scan.as_slice() {
+        if found.len() < 9 && v.is_finite() && !found.contains(&v) {
+            found.push(v);
+        }
+    }
+    found.sort_by(f32::total_cmp);
+    let words: Vec<String> = found.iter().take(8).map(f32::to_string).collect();
+    Error::specimen(
+        format!(
+            "no voxel has one of the labels {labels:?}; values found: {}{}",
+            words.join(", "),
+            if found.len() > 8 { ", …" } else { "" }
+        ),
+        "check the labels, or give a threshold if the scan holds grey values",
+    )
+}
+
+/// The scan's values where there is bone, 0 elsewhere.
+pub(super) fn of_bone(scan: &Volume<f32>, bone: &Volume<u8>) -> Volume<f32> {
+    let voxels = scan.as_slice().par_iter().zip(bone.as_slice());
+    let values = voxels
+        .map(|(&v, &b)| if b == 0 { 0.0 } else { v })
+        .collect();
+    let mut grey = Volume::from_vec(scan.grid, values);
+    grey.affine = scan.affine;
+    grey
+}

@@ -1,6 +1,6 @@
 //! Owns the voxel elements of a specimen: their size, equal or graded, and how they are integrated.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::mask::resample;
 use crate::operator::Operator;
@@ -9,6 +9,7 @@ use crate::physics::hex8::Hex8;
 use crate::physics::hex8::element::Integration;
 use crate::physics::hex8::graded::Graded;
 use crate::stage::solve::SolveParams;
+use crate::stage::solve::tissue::{Mixed, Tissue};
 use crate::topology::voxels::{Planes, VoxelMesh};
 use crate::volume::Specimen;
 use std::ops::Range;
@@ -38,12 +39,14 @@ impl Bricks {
     /// # Errors
     /// Grips that meet, or too many nodes.
     pub fn new(specimen: &Specimen, params: &SolveParams, keep: Keep) -> Result<Self> {
-        let (young, nu) = (params.young_mpa, params.poisson);
-        let rule = if nu > LOCKING_POISSON {
-            Integration::MeanDilatation
-        } else {
-            Integration::Full
+        let solid = match Tissue::of(specimen, params)? {
+            Tissue::Uniform(solid) => solid,
+            Tissue::Mixed(mixed) => {
+                return Ok(Bricks::Graded(of_mixed(specimen, &mixed, params, keep)?));
+            }
         };
+        let (young, nu) = (solid.young_mpa, solid.poisson);
+        let rule = rule(nu);
         if params.coarsen > 1 {
             let fractions = resample::coarsen(&specimen.bone, params.coarsen);
             let values = fractions.as_slice();
@@ -64,6 +67,52 @@ impl Bricks {
             Bricks::Graded(model) => model.mesh(),
         }
     }
+}
+
+fn rule(poisson: f64) -> Integration {
+    if poisson > LOCKING_POISSON {
+        Integration::MeanDilatation
+    } else {
+        Integration::Full
+    }
+}
+
+/// Elements of tissue that differs from voxel to voxel.
+fn of_mixed(
+    specimen: &Specimen,
+    mixed: &Mixed,
+    params: &SolveParams,
+    keep: Keep,
+) -> Result<Graded> {
+    let kinds: Vec<(f64, Integration)> = mixed.poissons.iter().map(|&nu| (nu, rule(nu))).collect();
+    let young = mixed.mean_mpa;
+    if params.coarsen > 1 {
+        if kinds.len() > 1 {
+            return Err(Error::setting(
+                "coarsen",
+                "tissues of different Poisson's ratios would share elements",
+                "solve at full resolution, or give all labels one Poisson's ratio",
+            ));
+        }
+        let fractions = resample::coarsen(&specimen.bone, params.coarsen);
+        let moduli = resample::coarsen_values(&specimen.bone, params.coarsen, &mixed.factor);
+        let bone = |f: &f32| *f >= LEAST_FRACTION;
+        let mesh = mesh(fractions.grid, fractions.as_slice(), bone, params, keep)?;
+        let factor = |e: usize| moduli.as_slice()[e];
+        return Ok(Graded::of_kinds(mesh, young, &kinds, factor, |_| 0));
+    }
+    let n = params.refine;
+    let refined = (n > 1).then(|| resample::refine(&specimen.bone, n));
+    let bone = refined.as_ref().unwrap_or(&specimen.bone);
+    let mesh = mesh(bone.grid, bone.as_slice(), |b| *b != 0, params, keep)?;
+    let (voxels, [nx, ny, _]) = (specimen.bone.grid, bone.grid.n);
+    let voxel = |e: usize| match n {
+        1 => e,
+        _ => voxels.index([e % nx / n, e / nx % ny / n, e / (nx * ny) / n]),
+    };
+    let factor = |e: usize| mixed.factor[voxel(e)];
+    let kind = |e: usize| mixed.kind.get(voxel(e)).copied().unwrap_or(0);
+    Ok(Graded::of_kinds(mesh, young, &kinds, factor, kind))
 }
 
 fn mesh<T: Sync>(

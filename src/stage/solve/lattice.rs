@@ -10,12 +10,14 @@ use crate::par::sum_chunks;
 use crate::physics::lattice::multigrid::Springs;
 use crate::physics::lattice::pieces::{GradedLattice, GradedSprings};
 use crate::physics::lattice::{self, Lattice};
+use crate::physics::material::Solid;
 use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
 use crate::solve::fallback::minimise_or_fall_back;
-use crate::stage::lattice::{Boundary, Case, build, build_pieces};
+use crate::stage::lattice::{Boundary, Case, build_of, build_pieces};
 use crate::stage::solve::mechanisms::mechanisms;
 use crate::stage::solve::solved::{Moduli, Solved};
+use crate::stage::solve::tissue::Tissue;
 use crate::stage::solve::{Ends, Load, SolveParams};
 use crate::topology::placement::Frame;
 use crate::topology::sites::Grips;
@@ -39,8 +41,16 @@ pub fn solve_lattice(
             "add --method voxel-fe, or use --load uniaxial",
         ));
     }
-    let moduli =
-        lattice::Moduli::new(case.structure, case.lp_mm, params.young_mpa, params.poisson)?;
+    let tissue = Tissue::of(specimen, params)?;
+    let (solid, mixed) = one_ratio(&tissue)?;
+    let moduli = lattice::Moduli::new(case.structure, case.lp_mm, solid.young_mpa, solid.poisson)?;
+    if case.in_pieces() && mixed.is_some() {
+        return Err(Error::setting(
+            "solve.material",
+            "graded SC lattices are of one tissue",
+            "use firm and floppy lattices, or add --method voxel-fe",
+        ));
+    }
     if case.in_pieces() {
         if params.mechanisms {
             return Err(Error::setting(
@@ -66,7 +76,7 @@ pub fn solve_lattice(
             &model, &springs, &virial, &laid, specimen, case, params, observe,
         ));
     }
-    let sites = build(specimen, case, params.axis, params.grip_mm)?;
+    let sites = build_of(specimen, mixed, case, params.axis, params.grip_mm)?;
     if sites.is_empty() {
         return Ok(Solved::disconnected(sites.dropped));
     }
@@ -168,6 +178,30 @@ fn solve_model(
         ended: info.ended,
         moduli: assess(model, virial, laid, case.boundary, &loaded, &u, &info),
         mechanisms: None,
+    }
+}
+
+/// The solid that a lattice is laid out for, and each voxel's modulus over it.
+///
+/// # Errors
+/// More than one Poisson's ratio: the ratio of a lattice's springs to its volumetric term is the same at every site.
+fn one_ratio(tissue: &Tissue) -> Result<(Solid, Option<&[f32]>)> {
+    match tissue {
+        Tissue::Uniform(solid) => Ok((*solid, None)),
+        Tissue::Mixed(mixed) => match mixed.poissons[..] {
+            [poisson] => {
+                let young_mpa = mixed.mean_mpa;
+                Ok((Solid { young_mpa, poisson }, Some(&mixed.factor)))
+            }
+            _ => Err(Error::setting(
+                "solve.material",
+                format!(
+                    "a lattice has one Poisson's ratio, the labels have {:?}",
+                    mixed.poissons
+                ),
+                "give all labels one ratio, or add --method voxel-fe",
+            )),
+        },
     }
 }
 

@@ -5,10 +5,12 @@ pub mod lattice;
 pub mod mechanisms;
 pub mod solved;
 pub mod stiffness;
+pub mod tissue;
 pub mod voxel_fe;
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
+use crate::physics::material::Material;
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
@@ -97,6 +99,9 @@ pub struct SolveParams {
     pub method: Method,
     pub young_mpa: f64,
     pub poisson: f64,
+    /// How tissue differs from voxel to voxel. None: E and ν as above everywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub material: Option<Material>,
     /// Nominal strain u / L_g; negative is compression.
     pub strain: f64,
     /// Thickness of each grip; 0: the end planes.
@@ -123,6 +128,7 @@ impl Default for SolveParams {
             method: Method::Lattice,
             young_mpa: 1000.0,
             poisson: 0.3,
+            material: None,
             strain: -0.01,
             grip_mm: 0.0,
             load: Load::Uniaxial,
@@ -203,6 +209,9 @@ impl SolveParams {
                 ),
                 "set one of them to 1",
             ));
+        }
+        if let Some(material) = &self.material {
+            material.check(self.poisson)?;
         }
         if self.max_iterations == 0 {
             return Err(Error::setting(

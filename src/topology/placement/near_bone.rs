@@ -68,7 +68,7 @@ fn rows_within(bone: &Volume<u8>, position_mm: [f64; 3], radius: f64, found: &mu
 }
 
 /// Voxels `first..past` along one axis whose centres lie within `radius` of `x`.
-fn centres_within(x: f64, radius: f64, h: f64, n: usize) -> (usize, usize) {
+pub(in crate::topology) fn centres_within(x: f64, radius: f64, h: f64, n: usize) -> (usize, usize) {
     let (low, high) = ((x - radius) / h - 0.5, (x + radius) / h - 0.5);
     if high < 0.0 {
         return (0, 0);

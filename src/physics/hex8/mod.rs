@@ -179,7 +179,7 @@ mod tests {
     fn elements_of_two_kinds_have_their_own_ratio_each() {
         let rule = Integration::Full;
         let kinds = [(0.3, rule), (0.45, Integration::MeanDilatation)];
-        let second = |e: usize| e % 3 == 0;
+        let second = |e: usize| e % 3 < 1;
         let mesh = random([11, 7, 6], 50, 5).mesh;
         let x = vector(mesh.len());
         let mixed =

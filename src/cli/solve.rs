@@ -7,6 +7,7 @@ use bonepd_ct::grid::Axis;
 use bonepd_ct::physics::material::{Law, Material};
 use bonepd_ct::run::Outcome;
 use bonepd_ct::run::session::Session;
+use bonepd_ct::stage::solve::fields::Field;
 use bonepd_ct::stage::solve::{Conditions, Ends, Load, Method, SolveParams};
 use clap::Args;
 use std::path::PathBuf;
@@ -86,9 +87,19 @@ pub struct SolveSettings {
     /// Also count mechanisms (motions that cost next to no energy); takes a factorisation, for small models
     #[arg(long)]
     mechanisms: bool,
-    /// Fields to write, comma-separated (displacement, energy-density, ...) [default: none]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    fields: Vec<String>,
+    /// voxel-fe: fields to write, comma-separated, as NIfTI on the scan's grid and fields.vti for ParaView: displacement
+    /// (mm), sed (strain energy density, MPa), von-mises (MPa), fraction (bone in an element) [default: none]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::choice::<Field>(&["displacement", "sed", "von-mises", "fraction"]))]
+    fields: Vec<Field>,
+    /// voxel-fe: find the failure load, where 2 % of the bone exceed an effective strain of 0.007 (Pistoia et al. 2002)
+    #[arg(long)]
+    failure: bool,
+    /// Share of the bone in that criterion, as 2% or 0.02
+    #[arg(long, value_name = "SHARE", value_parser = words::fraction, requires = "failure")]
+    critical_volume: Option<f64>,
+    /// Effective strain in that criterion
+    #[arg(long, value_name = "STRAIN", value_parser = words::positive, requires = "failure")]
+    critical_strain: Option<f64>,
 }
 
 impl SolveSettings {
@@ -124,19 +135,15 @@ impl SolveSettings {
             }
             None => {}
         }
-        self.refuse_unavailable()?;
-        params.check()
-    }
-
-    fn refuse_unavailable(&self) -> Result<()> {
-        match self.fields.is_empty() {
-            true => Ok(()),
-            false => Err(Error::setting(
-                "--fields",
-                "not available in this version",
-                "leave it out",
-            )),
+        if !self.fields.is_empty() {
+            params.fields.clone_from(&self.fields);
         }
+        if self.failure {
+            let criterion = params.pistoia.get_or_insert_default();
+            criterion.critical_volume = self.critical_volume.unwrap_or(criterion.critical_volume);
+            criterion.critical_strain = self.critical_strain.unwrap_or(criterion.critical_strain);
+        }
+        params.check()
     }
 }
 

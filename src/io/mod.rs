@@ -29,4 +29,5 @@ pub mod stiffness;
 pub mod table;
 pub mod tiff;
 mod tiff_directories;
+pub mod vti;
 pub mod vtk;

@@ -4,6 +4,7 @@ pub mod apparent;
 pub mod extrapolate;
 pub mod ffb;
 pub mod morphometry;
+pub mod pistoia;
 pub mod row;
 pub mod statistics;
 pub mod stiffness;

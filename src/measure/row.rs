@@ -57,4 +57,7 @@ pub struct Row {
     pub mechanisms: Option<u64>,
     /// The law by which tissue differs from voxel to voxel; `young_mpa` is then the bone's mean.
     pub material: Option<String>,
+    /// By Pistoia's criterion, on request: magnitude of the reaction at failure, and what the load is multiplied by.
+    pub failure_load_n: Option<f64>,
+    pub failure_factor: Option<f64>,
 }

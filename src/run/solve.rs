@@ -1,7 +1,7 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
 use crate::error::Result;
-use crate::io::{inp, specimen};
+use crate::io::{inp, nifti, specimen, vti};
 use crate::measure::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapolated};
 use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
@@ -13,6 +13,7 @@ use crate::run::session::Session;
 use crate::run::stiffness;
 use crate::solve::cg::CgStep;
 use crate::stage::lattice::{Case, LatticeParams};
+use crate::stage::solve::fields::Recorded;
 use crate::stage::solve::tissue::Tissue;
 use crate::stage::solve::{Load, Method, SolveParams, lattice, voxel_fe};
 use crate::volume::Specimen;
@@ -53,19 +54,22 @@ pub fn solve(
         };
         let blank = job.label(&specimen, params, settings);
         let kept = results.find(&blank, params);
-        let row =
-            match kept.filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params)) {
-                Some(row) => row,
-                None if session.dry_run => {
-                    session.say(format!(
-                        "would solve {} {} mm",
-                        job.name(&blank),
-                        blank.lp_mm
-                    ));
-                    continue;
-                }
-                None => solve_job(dir, &specimen, &job, &blank, params, session)?,
-            };
+        let row = match kept
+            .filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params))
+            // Fields are written over by the next solve: whether those there are these is not known.
+            .filter(|_| params.fields.is_empty())
+        {
+            Some(row) => row,
+            None if session.dry_run => {
+                session.say(format!(
+                    "would solve {} {} mm",
+                    job.name(&blank),
+                    blank.lp_mm
+                ));
+                continue;
+            }
+            None => solve_job(dir, &specimen, &job, &blank, params, session)?,
+        };
         session.say(in_words(&row));
         results.keep(&blank, params, &row)?;
         rows.push(row);
@@ -162,18 +166,38 @@ fn solve_job(
         });
     }
     let observe = |step| show(&bar, step, params.tolerance);
-    let solved = match job {
-        Job::Lattice(case) => lattice::solve_lattice(specimen, case, params, observe)?,
-        Job::VoxelFe => voxel_fe::solve_voxels(specimen, params, observe)?,
+    let (solved, recorded) = match job {
+        Job::Lattice(case) => (
+            lattice::solve_lattice(specimen, case, params, observe)?,
+            Recorded::default(),
+        ),
+        Job::VoxelFe => voxel_fe::solve_recorded(specimen, params, observe)?,
     };
     bar.finish_and_clear();
+    write_fields(dir, &recorded)?;
     let row = solved.row(blank.clone());
     Ok(Row {
         wall_s: Some(meter.wall_s()),
         peak_mib: meter.peak_mib(),
         discretization_error_mpa: voxel_fe_error(&row),
+        failure_load_n: recorded.failure.map(|f| f.load_n),
+        failure_factor: recorded.failure.map(|f| f.factor),
         ..row
     })
+}
+
+/// `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView.
+fn write_fields(dir: &Path, recorded: &Recorded) -> Result<()> {
+    for field in &recorded.fields {
+        let file = format!("field-{}.nii.gz", field.name.replace('_', "-"));
+        nifti::write(&dir.join(file), &field.values)?;
+    }
+    let arrays: Vec<_> = recorded
+        .fields
+        .iter()
+        .map(|f| (f.name, &f.values))
+        .collect();
+    vti::write(&dir.join("fields.vti"), &arrays)
 }
 
 /// Progress is the share of the error's decades already gained.

@@ -81,6 +81,12 @@ impl Graded {
         &self.mesh
     }
 
+    /// Factor and kind of the element whose corner of smallest x, y, z is a node.
+    pub fn stiffness_of(&self, node: usize) -> (f32, u8) {
+        let kind = self.kind.get(node).copied().unwrap_or(0);
+        (self.factor[node], kind)
+    }
+
     fn elements(&self) -> Elements<'_> {
         Elements {
             mesh: &self.mesh,

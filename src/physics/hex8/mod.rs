@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 pub mod element;
+pub mod fields;
 pub mod graded;
 mod kernel;
 mod stencils;

@@ -61,6 +61,14 @@ impl Bricks {
         Ok(Bricks::Equal(Hex8::new(mesh, young, nu, rule)))
     }
 
+    /// Factor and kind of the element whose corner of smallest x, y, z is a node.
+    pub fn stiffness_of(&self, node: usize) -> (f32, u8) {
+        match self {
+            Bricks::Equal(_) => (1.0, 0),
+            Bricks::Graded(model) => model.stiffness_of(node),
+        }
+    }
+
     pub fn mesh(&self) -> &VoxelMesh {
         match self {
             Bricks::Equal(model) => &model.mesh,
@@ -69,7 +77,7 @@ impl Bricks {
     }
 }
 
-fn rule(poisson: f64) -> Integration {
+pub(super) fn rule(poisson: f64) -> Integration {
     if poisson > LOCKING_POISSON {
         Integration::MeanDilatation
     } else {

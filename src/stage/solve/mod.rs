@@ -1,6 +1,7 @@
 //! Owns the solve stage: material, load, supports and accuracy in, apparent moduli out.
 
 pub mod bricks;
+pub mod fields;
 pub mod lattice;
 pub mod mechanisms;
 pub mod solved;
@@ -10,7 +11,9 @@ pub mod voxel_fe;
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
+use crate::measure::pistoia::Pistoia;
 use crate::physics::material::Material;
+use crate::stage::solve::fields::Field;
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
@@ -120,6 +123,12 @@ pub struct SolveParams {
     pub coarsen: usize,
     /// Count mechanisms, too; takes a factorisation.
     pub mechanisms: bool,
+    /// voxel-fe: fields to write.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fields: Vec<Field>,
+    /// voxel-fe: find the failure load by this criterion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pistoia: Option<Pistoia>,
 }
 
 impl Default for SolveParams {
@@ -140,6 +149,8 @@ impl Default for SolveParams {
             refine: 1,
             coarsen: 1,
             mechanisms: false,
+            fields: Vec::new(),
+            pistoia: None,
         }
     }
 }
@@ -212,6 +223,17 @@ impl SolveParams {
         }
         if let Some(material) = &self.material {
             material.check(self.poisson)?;
+        }
+        if let Some(pistoia) = &self.pistoia {
+            pistoia.check()?;
+        }
+        let recorded = !self.fields.is_empty() || self.pistoia.is_some();
+        if recorded && (self.method == Method::Lattice || self.load == Load::Stiffness) {
+            return Err(Error::setting(
+                "solve.fields",
+                "fields and the failure load come from one load on voxel elements",
+                "add --method voxel-fe with --load uniaxial or confined, or leave --fields and --failure out",
+            ));
         }
         if self.max_iterations == 0 {
             return Err(Error::setting(

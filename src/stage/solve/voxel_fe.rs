@@ -10,6 +10,7 @@ use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
 use crate::solve::fallback::minimise_mixed_or_fall_back;
 use crate::stage::solve::bricks::{Bricks, Keep};
+use crate::stage::solve::fields::{self, Recorded};
 use crate::stage::solve::mechanisms::mechanisms;
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::{Ends, Load, SolveParams};
@@ -25,6 +26,15 @@ pub fn solve_voxels(
     params: &SolveParams,
     observe: impl FnMut(CgStep),
 ) -> Result<Solved> {
+    Ok(solve_recorded(specimen, params, observe)?.0)
+}
+
+/// The same, with the fields and the failure load that the settings ask for.
+pub fn solve_recorded(
+    specimen: &Specimen,
+    params: &SolveParams,
+    observe: impl FnMut(CgStep),
+) -> Result<(Solved, Recorded)> {
     params.check()?;
     if params.load == Load::Stiffness {
         return Err(Error::setting(
@@ -37,7 +47,7 @@ pub fn solve_voxels(
     let mesh = model.mesh();
     let grips = Planes::within(&mesh.grid, params.axis, params.grip_mm)?;
     if mesh.is_empty() {
-        return Ok(Solved::disconnected(mesh.dropped));
+        return Ok((Solved::disconnected(mesh.dropped), Recorded::default()));
     }
     let axis = params.axis.index();
     let gauge_mm = (grips.high - grips.low) as f64 * mesh.grid.spacing_mm[axis];
@@ -59,16 +69,20 @@ pub fn solve_voxels(
     let preconditioner = Amg::new(&model, &held, &AmgParams::new(mesh.grid.spacing_mm));
     let info = minimise_mixed_or_fall_back(&model, &held, &preconditioner, &mut u, &cg, observe);
     drop(preconditioner);
-    Ok(Solved {
+    let moduli = assess(&model, mesh, grips, &loaded, &u, &info);
+    let force_n = moduli.from_reaction_mpa * loaded.area_mm2 * params.strain;
+    let recorded = fields::record(&model, specimen, params, &u, force_n)?;
+    let solved = Solved {
         sites: mesh.elements,
         dropped: mesh.dropped,
         unknowns: held.free::<3>(),
         iterations: info.iterations,
         residual: info.residual,
         ended: info.ended,
-        moduli: assess(&model, mesh, grips, &loaded, &u, &info),
+        moduli,
         mechanisms,
-    })
+    };
+    Ok((solved, recorded))
 }
 
 /// Which unknowns are held, and a start that meets them: the field of a homogeneous bar.

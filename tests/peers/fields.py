@@ -1,0 +1,49 @@
+#!/usr/bin/env python3
+"""Fields of a solved block, read back by VTK (what ParaView reads with) and nibabel, both from PyPI.
+
+python3 tests/peers/fields.py target/release/bonepd-ct
+"""
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+try:
+    import nibabel
+    import numpy
+    from vtk.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXML import vtkXMLImageDataReader
+except ImportError as missing:
+    print(f"skipped: {missing}; pip install vtk nibabel")
+    sys.exit(0)
+
+program = sys.argv[1] if len(sys.argv) > 1 else "target/release/bonepd-ct"
+work = pathlib.Path(tempfile.mkdtemp())
+affine = numpy.array([[0.02, 0, 0, 3.0], [0, 0.02, 0, -2.0], [0, 0, 0.03, 1.0], [0, 0, 0, 1]])
+bone = numpy.ones((70, 60, 80), numpy.uint8)
+bone[:20, :, 10:] = 0
+nibabel.save(nibabel.Nifti1Image(bone, affine), work / "scan.nii.gz")
+out = work / "out"
+subprocess.run([program, "segment", work / "scan.nii.gz", "-o", out, "--lower", "1", "--quiet"], check=True)
+fields = "displacement,sed,von-mises,fraction"
+subprocess.run(
+    [program, "solve", out, "--method", "voxel-fe", "--fields", fields, "--quiet"], check=True
+)
+reader = vtkXMLImageDataReader()
+reader.SetFileName(str(out / "fields.vti"))
+reader.Update()
+image = reader.GetOutput()
+assert image.GetDimensions() == (71, 61, 81), image.GetDimensions()
+corner = affine[:3, 3] - 0.5 * numpy.diag(affine)[:3]
+assert numpy.allclose(image.GetOrigin(), corner, atol=1e-6), image.GetOrigin()
+assert numpy.allclose(image.GetSpacing(), [0.02, 0.02, 0.03], atol=1e-7), image.GetSpacing()
+data = image.GetCellData()
+names = [data.GetArrayName(i) for i in range(data.GetNumberOfArrays())]
+for name in names:
+    from_vtk = vtk_to_numpy(data.GetArray(name)).reshape(80, 60, 70).transpose(2, 1, 0)
+    nifti = nibabel.load(out / f"field-{name.replace('_', '-')}.nii.gz")
+    assert numpy.allclose(nifti.affine, affine, atol=1e-6), nifti.affine
+    assert numpy.array_equal(nifti.get_fdata(dtype=numpy.float32), from_vtk), name
+    assert not from_vtk[bone == 0].any(), name
+assert len(names) == 6, names
+print(f"{len(names)} fields: VTK and nibabel read the same values at the same place")

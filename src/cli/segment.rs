@@ -60,7 +60,7 @@ pub struct SegmentSettings {
     /// Also keep the grey values of bone in DIR/grey.nii.gz, for moduli that follow them (`solve --material`)
     #[arg(long)]
     keep_grey: bool,
-    /// Also measure Tb.Th and Tb.Sp (sphere fitting) and Conn.D; takes longer
+    /// Also measure Tb.Th and Tb.Sp (sphere fitting), Conn.D, and DA by mean intercept lengths; takes longer
     #[arg(long)]
     morphometry: bool,
 }

@@ -41,6 +41,16 @@ impl Inside<'_> {
         }
     }
 
+    /// 1 inside; None for the whole box.
+    pub fn mask(&self, grid: Grid) -> Option<Volume<u8>> {
+        if matches!(self, Inside::Box) {
+            return None;
+        }
+        let mut mask = Volume::from_vec(grid, vec![1; grid.len()]);
+        self.clear_outside(&mut mask);
+        Some(mask)
+    }
+
     /// Sets what is outside to 0 and returns how many bone voxels were lost.
     pub fn clear_outside(&self, bone: &mut Volume<u8>) -> u64 {
         let grid = bone.grid;

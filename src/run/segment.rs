@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::io::specimen::{self, Input, SegmentRecord};
 use crate::io::{atomic, picture, scan};
-use crate::measure::morphometry::Spread;
+use crate::measure::spheres::Spread;
 use crate::run::session::Session;
 use crate::stage::segment::{self as stage, SegmentParams, Voi};
 use crate::volume::{Specimen, Volume};
@@ -143,11 +143,12 @@ fn say(record: &SegmentRecord, session: &Session) {
             })
         };
         session.say(format!(
-            "{}: Tb.Th {}, Tb.Sp {}, Conn.D {:.2} /mm³",
+            "{}: Tb.Th {}, Tb.Sp {}, Conn.D {:.2} /mm³, DA {}",
             record.scan,
             mm(&m.tb_th),
             mm(&m.tb_sp),
-            m.conn_d_per_mm3
+            m.conn_d_per_mm3,
+            m.fabric.map_or("NA".into(), |f| format!("{:.3}", f.da)),
         ));
     }
     r.warnings

@@ -141,7 +141,10 @@ pub fn segment(
         bv_mm3: specimen.bv_mm3(),
         bv_tv: specimen.bv_tv(),
         mean_thickness_mm: plate_thickness_mm(&specimen.bone),
-        morphometry: params.morphometry.then(|| morphometry(&specimen.bone)),
+        morphometry: params.morphometry.then(|| {
+            let within = inside.mask(scan.grid);
+            morphometry(&specimen.bone, within.as_ref(), tv_mm3)
+        }),
         warnings: Vec::new(),
     };
     summary.warnings = warnings(&summary);

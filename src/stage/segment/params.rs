@@ -56,7 +56,7 @@ pub struct SegmentParams {
     pub keep_all: bool,
     /// Also keep the values of bone voxels, for moduli that follow them.
     pub keep_grey: bool,
-    /// Also measure Tb.Th, Tb.Sp and Conn.D of the mask.
+    /// Also measure Tb.Th, Tb.Sp, Conn.D and DA of the mask.
     pub morphometry: bool,
 }
 

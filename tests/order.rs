@@ -74,6 +74,7 @@ fn block(n: usize) -> Specimen {
         bone: Volume::from_vec(grid, vec![1; grid.len()]),
         tv_mm3: 1.0,
         tv_definition: "box".into(),
+        grey: None,
     }
 }
 

@@ -33,6 +33,7 @@ fn specimen(n: [usize; 3], h: [f64; 3], bone: impl Fn([usize; 3]) -> bool) -> Sp
         tv_mm3: grid.size_mm().iter().product(),
         bone: Volume::from_vec(grid, voxels),
         tv_definition: "box".into(),
+        grey: None,
     }
 }
 

@@ -41,6 +41,11 @@ pub fn lattice(
 ) -> Result<Vec<LatticeSummary>> {
     params.check()?;
     let specimen = load(dir)?;
+    if specimen.grey.is_some() && !exports.is_empty() {
+        session.warn(
+            "the folder keeps grey values, but exported lattices are of one tissue: laws of moduli are `solve`'s",
+        );
+    }
     let mut lattices = Vec::new();
     for case in params.cases() {
         let exports = if session.dry_run { &[] } else { exports };

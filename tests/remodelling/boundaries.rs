@@ -6,7 +6,7 @@ use super::square::{DIGITS, S2, Square, assert_near, continuum_square, simulate}
 const REUSE: &str = "solver = { method = 'reuse', tolerance = 1e-10, max_iterations = 200 }";
 
 #[test]
-#[ignore = "slow"]
+#[ignore = "fails: on 40 x 40 with clamped layers the reusing solver finds no step (seen at t = 0.03)"]
 fn a6_boundary_variants() {
     let fixed = "density = 'fixed'";
     let rigid = "normal = 'rigid'";
@@ -77,7 +77,7 @@ fn a6_clamped_continuum() {
 }
 
 #[test]
-#[ignore = "slow"]
+#[ignore = "fails: the reusing solver stops at t = 4"]
 fn a6_clamped_continuum_on_a_finer_grid() {
     let times = [2.0, 4.0, 6.0, 8.0];
     let cases = [
@@ -98,7 +98,7 @@ fn a6_clamped_continuum_on_a_finer_grid() {
 
 /// Clamped, too, the gap to the lattice's local limit halves with delta: 0.0791 and 0.0403 at t = 8.
 #[test]
-#[ignore = "slow"]
+#[ignore = "slow, and not yet seen to pass"]
 fn a6_the_clamped_gap_halves() {
     let model = format!("density_at = 'gauss'\n energy = 'stencil-bonds'\n {REUSE}");
     let limit = continuum_square(20, S2, true, &model).means([8.0])[0];

@@ -103,7 +103,6 @@ pub struct SolveParams {
     pub young_mpa: f64,
     pub poisson: f64,
     /// How tissue differs from voxel to voxel. None: E and ν as above everywhere.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub material: Option<Material>,
     /// Nominal strain u / L_g; negative is compression.
     pub strain: f64,
@@ -124,10 +123,8 @@ pub struct SolveParams {
     /// Count mechanisms, too; takes a factorisation.
     pub mechanisms: bool,
     /// voxel-fe: fields to write.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fields: Vec<Field>,
     /// voxel-fe: find the failure load by this criterion.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub pistoia: Option<Pistoia>,
 }
 

@@ -10,6 +10,7 @@ mod formats;
 mod fuzz;
 mod laws;
 mod layers;
+mod made;
 mod molecular;
 mod order;
 mod patch;

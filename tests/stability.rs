@@ -1,8 +1,9 @@
 //! Hard cases: what each came to, how far its stated error was off, and how many mechanisms it has. Quick checks by
 //! default; `cargo test --release stability_cases -- --ignored --nocapture` prints the table of all cases.
 
+use crate::made::specimen;
 use crate::stopped::textbook;
-use bonepd_ct::grid::{Axis, Grid};
+use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::Operator;
 use bonepd_ct::operator::held::Held;
 use bonepd_ct::operator::probe::probe;
@@ -20,22 +21,9 @@ use bonepd_ct::stage::solve::solved::Solved;
 use bonepd_ct::stage::solve::voxel_fe::{grid_places, solve_voxels, supports};
 use bonepd_ct::stage::solve::{Ends, SolveParams};
 use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
-use bonepd_ct::volume::{Specimen, Volume};
+use bonepd_ct::volume::Specimen;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-
-fn specimen(n: [usize; 3], h: [f64; 3], bone: impl Fn([usize; 3]) -> bool) -> Specimen {
-    let grid = Grid::new(n, h);
-    let at = |i: usize| [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
-    let voxels = (0..grid.len()).map(|i| u8::from(bone(at(i)))).collect();
-    Specimen {
-        name: "made".into(),
-        tv_mm3: grid.size_mm().iter().product(),
-        bone: Volume::from_vec(grid, voxels),
-        tv_definition: "box".into(),
-        grey: None,
-    }
-}
 
 /// Struts of `thick` voxels on a grid of cells, a share of them broken: hinges, dead ends, few paths.
 fn struts(n: usize, cell: usize, thick: usize, broken: f64, seed: u64) -> Specimen {

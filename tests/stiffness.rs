@@ -1,28 +1,16 @@
 //! The apparent stiffness matrix: closed forms, symmetries, what its stated error is worth, and its file.
 
 use crate::cli::run;
-use bonepd_ct::grid::{Axis, Grid};
+use crate::made::specimen;
+use bonepd_ct::grid::Axis;
 use bonepd_ct::io::stiffness as file;
 use bonepd_ct::measure::stiffness::{Six, compliance, orthotropic, seen_from};
 use bonepd_ct::stage::solve::stiffness::{Stiffness, solve_stiffness};
 use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
 use bonepd_ct::stage::solve::{Conditions, Load, SolveParams};
-use bonepd_ct::volume::{Specimen, Volume};
+use bonepd_ct::volume::Specimen;
 
 const BOTH: [Conditions; 2] = [Conditions::Kinematic, Conditions::Mixed];
-
-fn specimen(n: [usize; 3], h: [f64; 3], bone: impl Fn([usize; 3]) -> bool) -> Specimen {
-    let grid = Grid::new(n, h);
-    let at = |i: usize| [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
-    let voxels = (0..grid.len()).map(|i| u8::from(bone(at(i)))).collect();
-    Specimen {
-        name: "made".into(),
-        tv_mm3: grid.size_mm().iter().product(),
-        bone: Volume::from_vec(grid, voxels),
-        tv_definition: "box".into(),
-        grey: None,
-    }
-}
 
 /// Struts of unlike thickness along the axes, one of them slanted, and a plate: all 21 entries differ from zero.
 fn irregular(p: [usize; 3]) -> bool {

@@ -1,26 +1,13 @@
 //! Voxel finite elements against closed forms, and the multigrid that solves them.
 
-use bonepd_ct::grid::Grid;
+use crate::made::specimen;
 use bonepd_ct::solve::cg::Ended;
 use bonepd_ct::stage::solve::solved::Solved;
 use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
 use bonepd_ct::stage::solve::{Ends, Load, SolveParams};
-use bonepd_ct::volume::{Specimen, Volume};
+use bonepd_ct::volume::Specimen;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-
-fn specimen(n: [usize; 3], h: [f64; 3], bone: impl Fn([usize; 3]) -> bool) -> Specimen {
-    let grid = Grid::new(n, h);
-    let at = |i: usize| [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
-    let voxels = (0..grid.len()).map(|i| u8::from(bone(at(i)))).collect();
-    Specimen {
-        name: "made".into(),
-        tv_mm3: grid.size_mm().iter().product(),
-        bone: Volume::from_vec(grid, voxels),
-        tv_definition: "box".into(),
-        grey: None,
-    }
-}
 
 fn solve(specimen: &Specimen, params: &SolveParams) -> Solved {
     let solved = solve_voxels(specimen, params, |_| ()).unwrap();

@@ -202,3 +202,39 @@ fn the_real_stack_gives_the_reference_moduli() {
         }
     }
 }
+
+/// Firm's headline is a stress, not an energy: what it states of its error must hold, and be no excuse.
+#[test]
+fn the_stated_error_of_a_firm_modulus_holds() {
+    for (poisson, structure) in [
+        (0.3, Structure::Sc),
+        (0.45, Structure::Sc),
+        (0.3, Structure::Bcc),
+    ] {
+        let params = |tolerance| SolveParams {
+            poisson,
+            tolerance,
+            ..SolveParams::default()
+        };
+        let exact = solved(&frame(), structure, Boundary::Firm, &params(1e-11))
+            .moduli
+            .e_app_mpa;
+        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
+            let m = solved(&frame(), structure, Boundary::Firm, &params(tolerance)).moduli;
+            let error = (m.e_app_mpa - exact).abs();
+            println!(
+                "{structure:?} ν={poisson} {tolerance}: true {error:.2e}, stated {:.2e}",
+                m.algebraic_error_mpa
+            );
+            assert!(
+                m.algebraic_error_mpa <= tolerance * 1.001 * m.e_app_mpa,
+                "{m:?}"
+            );
+            // The bound asked for is three times what is stated.
+            assert!(
+                error < 3.0 * m.algebraic_error_mpa,
+                "{structure:?} {poisson} {tolerance}: {error} {m:?}"
+            );
+        }
+    }
+}

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::operator::nonlinear::Staggered;
 use crate::operator::sparse::Sparse;
 use crate::solve::anderson::Anderson;
-use crate::solve::direct::DirectLlt;
+use crate::solve::direct::{DirectLlt, DirectLu};
 use crate::solve::newton::NotConverged;
 use crate::solve::rough::RoughLlt;
 
@@ -21,10 +21,12 @@ pub struct Chord {
     pub max_iterations: usize,
 }
 
-/// Single precision, until a matrix proves too ill-conditioned for it.
+/// Single precision, until a matrix proves too ill-conditioned for it; without square roots' demand of definiteness, once
+/// one is not positive definite (bonds under compression at a clamped corner).
 enum Factor {
     Single(Box<RoughLlt>),
     Double(Box<DirectLlt>),
+    Indefinite(Box<DirectLu>),
 }
 
 /// What a solve took.
@@ -137,14 +139,13 @@ impl Chord {
     fn renew(&mut self, equations: &impl Staggered, q: &[f64]) -> Result<(), NotConverged> {
         equations.stiffness(q, &mut self.stiffness);
         self.age = 0;
-        let mut made = self.factor.factorize(&self.stiffness);
-        if made.is_err() && matches!(self.factor, Factor::Single(_)) {
-            let double = DirectLlt::new(&self.stiffness, &self.order);
-            self.factor = Factor::Double(Box::new(double.map_err(|_| NotConverged::Singular)?));
-            made = self.factor.factorize(&self.stiffness);
+        self.ready = false;
+        while self.factor.factorize(&self.stiffness).is_err() {
+            let next = self.factor.next(&self.stiffness, &self.order);
+            self.factor = next.ok_or(NotConverged::Singular)?;
         }
-        self.ready = made.is_ok();
-        made.map_err(|_| NotConverged::Singular)
+        self.ready = true;
+        Ok(())
     }
 
     /// Local unknowns first, then the others with the residual those leave; and the share of the former that is
@@ -175,10 +176,26 @@ impl Chord {
 }
 
 impl Factor {
+    /// What takes a matrix that this one does not; None where there is nothing more.
+    fn next(&self, pattern: &Sparse, order: &[usize]) -> Option<Factor> {
+        match self {
+            Factor::Single(_) => {
+                let llt = DirectLlt::new(pattern, order).ok()?;
+                Some(Factor::Double(Box::new(llt)))
+            }
+            Factor::Double(_) => {
+                let lu = DirectLu::new(pattern).ok()?;
+                Some(Factor::Indefinite(Box::new(lu)))
+            }
+            Factor::Indefinite(_) => None,
+        }
+    }
+
     fn factorize(&mut self, a: &Sparse) -> Result<()> {
         match self {
             Factor::Single(llt) => llt.factorize(a),
             Factor::Double(llt) => llt.factorize(a),
+            Factor::Indefinite(lu) => lu.factorize(a),
         }
     }
 
@@ -186,6 +203,7 @@ impl Factor {
         match self {
             Factor::Single(llt) => llt.solve(x),
             Factor::Double(llt) => llt.solve(x),
+            Factor::Indefinite(lu) => lu.solve(x),
         }
     }
 }

@@ -3,11 +3,11 @@
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::{Constrained, Held};
 use crate::operator::{Operator, Preconditioner, SinglePreconditioner};
-use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, minimise};
+use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, Goal, minimise_towards};
 use crate::solve::jacobi::Jacobi;
 use crate::solve::mixed;
 
-/// [`minimise`] with `preconditioner`; should that break down, from where it came to with the diagonal. Iterations are
+/// [`minimise`](crate::solve::cg::minimise) with `preconditioner`; should that break down, from where it came to with the diagonal. Iterations are
 /// those of both.
 pub fn minimise_or_fall_back<const D: usize>(
     operator: &impl Operator<D>,
@@ -15,13 +15,35 @@ pub fn minimise_or_fall_back<const D: usize>(
     preconditioner: &impl Preconditioner<D>,
     u: &mut [[f64; D]],
     params: &CgParams,
+    observe: impl FnMut(CgStep),
+) -> CgInfo {
+    towards_or_fall_back(operator, held, preconditioner, u, params, None, observe)
+}
+
+/// [`minimise_or_fall_back`], to the accuracy of a goal ([`minimise_towards`]).
+#[allow(clippy::too_many_arguments)] // minimise's, and the goal
+pub fn towards_or_fall_back<const D: usize>(
+    operator: &impl Operator<D>,
+    held: &Held,
+    preconditioner: &impl Preconditioner<D>,
+    u: &mut [[f64; D]],
+    params: &CgParams,
+    goal: Option<Goal<D>>,
     mut observe: impl FnMut(CgStep),
 ) -> CgInfo {
-    let first = minimise(operator, held, preconditioner, u, params, &mut observe);
+    let first = minimise_towards(
+        operator,
+        held,
+        preconditioner,
+        u,
+        params,
+        goal,
+        &mut observe,
+    );
     if first.ended != Ended::Breakdown {
         return first;
     }
-    carry_on(&first, operator, held, u, params, observe)
+    carry_on(&first, operator, held, u, params, goal, observe)
 }
 
 /// The same by [`mixed`], before it falls back.
@@ -37,15 +59,17 @@ pub fn minimise_mixed_or_fall_back(
     if first.ended != Ended::Breakdown {
         return first;
     }
-    carry_on(&first, operator, held, u, params, observe)
+    carry_on(&first, operator, held, u, params, None, observe)
 }
 
+#[allow(clippy::too_many_arguments)] // minimise's, the goal, and what came first
 fn carry_on<const D: usize>(
     first: &CgInfo,
     operator: &impl Operator<D>,
     held: &Held,
     u: &mut [[f64; D]],
     params: &CgParams,
+    goal: Option<Goal<D>>,
     mut observe: impl FnMut(CgStep),
 ) -> CgInfo {
     let diagonal = Jacobi::new(&Constrained {
@@ -56,7 +80,7 @@ fn carry_on<const D: usize>(
         max_iterations: params.max_iterations.saturating_sub(first.iterations),
         ..*params
     };
-    let second = minimise(operator, held, &diagonal, u, &left, |step| {
+    let second = minimise_towards(operator, held, &diagonal, u, &left, goal, |step| {
         observe(CgStep {
             iteration: first.iterations + step.iteration,
             ..step

@@ -8,7 +8,7 @@ use crate::operator::SinglePreconditioner;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::par::{CHUNK, sum_chunks};
-use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, NOTHING};
+use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, NOTHING, met};
 use crate::solve::estimate::EnergyTail;
 use rayon::prelude::*;
 
@@ -41,9 +41,26 @@ pub fn minimise(
     } else {
         residual(operator, held, u, unit, &mut r);
     }
-    while ended == Ended::IterationLimit && iterations < params.max_iterations {
+    let mut fallen = 1.0;
+    while ended == Ended::IterationLimit {
         preconditioner.apply_single(&r, &mut z, &mut spare);
         let rz = dot(&r, &z);
+        let energy = start.energy - tail.total();
+        if iterations > 0 {
+            let error = tail.update(unit * unit * rz).map(|e| e / energy);
+            observe(CgStep {
+                iteration: iterations,
+                residual: fallen,
+                energy_error: error,
+            });
+            if let Some(met) = met(params, error, energy / start.energy) {
+                ended = met;
+                break;
+            }
+        }
+        if iterations >= params.max_iterations {
+            break;
+        }
         let beta = if iterations == 0 { 0.0 } else { rz / rz_before };
         combine(&mut p, &z, beta as f32);
         // z now holds A p.
@@ -56,20 +73,11 @@ pub fn minimise(
         let mut norm = advance(u, &mut r, &p, &z, alpha, unit).sqrt();
         rz_before = rz;
         iterations += 1;
-        tail.push(unit * unit * alpha * rz);
-        let energy = start.energy - tail.total();
-        let error = tail.estimate().map(|e| e / energy);
-        let fallen = unit * norm / start.norm;
-        observe(CgStep {
-            iteration: iterations,
-            residual: fallen,
-            energy_error: error,
-        });
+        tail.push(alpha, unit * unit * rz);
+        fallen = unit * norm / start.norm;
         if fallen <= params.residual_tolerance {
             ended = Ended::ResidualTolerance;
-        } else if error.is_some_and(|e| e <= params.energy_tolerance && energy > 0.0) {
-            ended = Ended::EnergyTolerance;
-        } else if energy <= NOTHING * start.energy {
+        } else if start.energy - tail.total() <= NOTHING * start.energy {
             ended = Ended::Mechanism;
         } else if norm < REPLACE {
             let before = unit;
@@ -93,11 +101,13 @@ pub fn minimise(
             0.0
         },
         energy: end.energy,
-        energy_error: match tail.estimate() {
-            Some(e) => e,
-            None if start.norm > 0.0 => f64::INFINITY,
-            None => 0.0,
+        energy_error: match (ended, tail.estimate()) {
+            (Ended::Faint, _) => end.energy,
+            (_, Some(e)) => e,
+            (_, None) if start.norm > 0.0 => f64::INFINITY,
+            _ => 0.0,
         },
+        goal_error: None,
     }
 }
 

@@ -94,22 +94,36 @@ impl Graded {
             kind: &self.kind,
         }
     }
+}
 
-    /// The existing elements around a site, each with its factor and kind.
-    fn around(&self, site: usize) -> impl Iterator<Item = (usize, f32, usize)> + '_ {
-        let around = self.mesh.around[site];
-        let rows = self
-            .mesh
-            .segments_in(site..site + 1)
-            .next()
-            .map_or([0; 9], |s| s.rows);
-        (0..8usize)
-            .filter(move |e| around >> e & 1 == 1)
-            .map(move |e| {
-                let low = kernel::low_corner(&rows, 0, e);
-                let kind = self.kind.get(low).map_or(0, |&k| k as usize);
-                (e, self.factor[low], kind)
-            })
+impl Graded {
+    /// The elements around node `i` of a segment: the bit of each, its factor and kind.
+    fn around<'a>(
+        &'a self,
+        around: u8,
+        rows: &'a [u32; 9],
+        i: usize,
+    ) -> impl Iterator<Item = (u8, f32, usize)> + 'a {
+        let there = (0..8).filter(move |e| around >> e & 1 == 1);
+        there.map(move |e| {
+            let (factor, kind) = self.elements().of(kernel::low_corner(rows, i, e));
+            (1 << e, factor, kind)
+        })
+    }
+
+    /// Couplings of a node with its 27 neighbours.
+    fn sum(&self, elements: impl Iterator<Item = (u8, f32, usize)>) -> [Block; 27] {
+        let mut sums = [[[0.0; 3]; 3]; 27];
+        for (bit, factor, kind) in elements {
+            let (places, blocks) = self.couplings[kind].of(bit);
+            for (place, block) in places.iter().zip(blocks) {
+                let sum = &mut sums[place.index()];
+                for a in 0..3 {
+                    (0..3).for_each(|b| sum[a][b] += factor * block[a][b]);
+                }
+            }
+        }
+        sums
     }
 }
 
@@ -125,11 +139,18 @@ impl Operator<3> for Graded {
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
-        d.par_iter_mut().enumerate().for_each(|(site, d)| {
-            *d = [0.0; 3];
-            for (e, factor, kind) in self.around(site) {
-                let one = self.double[kind].diagonal(1 << e);
-                (0..3).for_each(|a| d[a] += f64::from(factor) * one[a]);
+        d.par_chunks_mut(par::CHUNK).enumerate().for_each(|(c, d)| {
+            let sites = c * par::CHUNK..c * par::CHUNK + d.len();
+            for segment in self.mesh.segments_in(sites.clone()) {
+                for (i, node) in segment.nodes().enumerate() {
+                    let d = &mut d[node - sites.start];
+                    *d = [0.0; 3];
+                    let around = self.mesh.around[node];
+                    for (bit, factor, kind) in self.around(around, &segment.rows, i) {
+                        let one = self.double[kind].diagonal(bit);
+                        (0..3).for_each(|a| d[a] += f64::from(factor) * one[a]);
+                    }
+                }
             }
         });
     }
@@ -144,22 +165,28 @@ impl Coarsen for Graded {
         let (mut columns, mut blocks) = (Vec::with_capacity(27), Vec::with_capacity(27));
         for segment in self.mesh.segments_in(sites) {
             for (i, node) in (0u32..).zip(segment.nodes()) {
-                let mut sums = [[[0f32; 3]; 3]; 27];
-                for (e, factor, kind) in self.around(node) {
-                    let (places, blocks) = self.couplings[kind].of(1 << e);
-                    for (place, block) in places.iter().zip(blocks) {
-                        let sum = &mut sums[place.index()];
-                        for a in 0..3 {
-                            (0..3).for_each(|b| sum[a][b] += factor * block[a][b]);
-                        }
-                    }
+                let around = self.mesh.around[node];
+                if around == 0 {
+                    visit(node, &[], &[]);
+                    continue;
                 }
-                let (places, _) = self.couplings[0].of(self.mesh.around[node]);
+                let alike = self.elements().alike(around, &segment.rows, i as usize);
+                let (places, whole) = self.couplings[0].of(around);
                 columns.clear();
+                columns.extend(
+                    places
+                        .iter()
+                        .map(|p| segment.rows[p.row as usize] + i + u32::from(p.dx) - 1),
+                );
                 blocks.clear();
-                for p in places {
-                    columns.push(segment.rows[p.row as usize] + i + u32::from(p.dx) - 1);
-                    blocks.push(sums[p.index()]);
+                match alike {
+                    Some((factor, 0)) => {
+                        blocks.extend(whole.iter().map(|b| b.map(|r| r.map(|v| factor * v))));
+                    }
+                    _ => {
+                        let sums = self.sum(self.around(around, &segment.rows, i as usize));
+                        blocks.extend(places.iter().map(|p| sums[p.index()]));
+                    }
                 }
                 visit(node, &columns, &blocks);
             }

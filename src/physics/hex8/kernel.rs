@@ -7,7 +7,7 @@
 use super::stencils::{NINTH, STRIDE, Stencils};
 use crate::simd::{self, Isa, Lanes};
 use crate::topology::voxels::VoxelMesh;
-use std::ops::Range;
+use std::ops::{Mul, Range};
 
 /// `y[i − nodes.start] = (A x)_i` for `i` in `nodes`, in double precision.
 pub fn rows_f64(
@@ -197,7 +197,7 @@ fn graded_avx2_f32(
 }
 
 #[inline(always)]
-fn gather_graded<L: Lanes<S: From<f32>>>(
+fn gather_graded<L: Lanes<S: From<f32> + Mul<Output = L::S>>>(
     tables: &[Stencils<L::S>],
     elements: Elements,
     nodes: Range<usize>,
@@ -214,15 +214,47 @@ fn gather_graded<L: Lanes<S: From<f32>>>(
         let out = &mut y[own.start - nodes.start..own.end - nodes.start];
         for (i, (&around, out)) in around.iter().zip(out).enumerate() {
             // SAFETY: as for equal elements; a row of elements reads two of the same rows and nodes.
-            *out = unsafe { graded_node::<L>(tables, around, elements, &segment.rows, i, x) };
+            *out = match around {
+                0 => [L::S::default(); 3],
+                _ => unsafe { graded_node::<L>(tables, around, elements, &segment.rows, i, x) },
+            };
         }
+    }
+}
+
+impl Elements<'_> {
+    /// Factor and kind of all elements `around` node `i` of a segment, if they are alike. There is one at least.
+    #[inline(always)]
+    pub fn alike(self, around: u8, rows: &[u32; 9], i: usize) -> Option<(f32, usize)> {
+        let first = self.of(low_corner(rows, i, around.trailing_zeros() as usize & 7));
+        let mut alike = true;
+        for e in 0..8 {
+            // Where there is no element, the first one again: no branch.
+            let there = around >> e & 1 == 1;
+            let e = if there {
+                e
+            } else {
+                around.trailing_zeros() as usize & 7
+            };
+            alike &= self.of(low_corner(rows, i, e)) == first;
+        }
+        alike.then_some(first)
+    }
+
+    #[inline(always)]
+    pub fn of(self, low: usize) -> (f32, usize) {
+        let kind = match self.kind.is_empty() {
+            true => 0,
+            false => usize::from(self.kind[low]),
+        };
+        (self.factor[low], kind)
     }
 }
 
 /// # Safety
 /// `1 <= rows[r] + i < x.len() − 1` for every row that an element around the node reaches.
 #[inline(always)]
-unsafe fn graded_node<L: Lanes<S: From<f32>>>(
+unsafe fn graded_node<L: Lanes<S: From<f32> + Mul<Output = L::S>>>(
     tables: &[Stencils<L::S>],
     around: u8,
     elements: Elements,
@@ -231,10 +263,14 @@ unsafe fn graded_node<L: Lanes<S: From<f32>>>(
     x: &[[L::S; 3]],
 ) -> [L::S; 3] {
     unsafe {
+        // Inside bone a node costs what it would with one modulus for all.
+        if let Some((factor, kind)) = elements.alike(around, rows, i) {
+            let sums = node::<L>(tables[kind].stencil(around), rows, i, x);
+            return sums.map(|v| v * L::S::from(factor));
+        }
         let (mut a, mut b, mut c, mut four) = (L::zero(), L::zero(), L::zero(), L::zero4());
         for e in (0..8).filter(|e| around >> e & 1 == 1) {
-            let low = low_corner(rows, i, e);
-            let kind = elements.kind.get(low).map_or(0, |&k| k as usize);
+            let (factor, kind) = elements.of(low_corner(rows, i, e));
             let stencil = tables[kind].stencil(1 << e);
             let (mut p, mut q, mut s, mut t) = (L::zero(), L::zero(), L::zero(), L::zero4());
             for k in 0..4 {
@@ -247,7 +283,7 @@ unsafe fn graded_node<L: Lanes<S: From<f32>>>(
                 s = s.fma(L::load(m.add(16)), u);
                 t = L::fma4(t, stencil.as_ptr().add(NINTH + 4 * r), first.add(8));
             }
-            let f = L::S::from(elements.factor[low]);
+            let f = L::S::from(factor);
             let wide = L::splat(f);
             a = a.fma(wide, p);
             b = b.fma(wide, q);

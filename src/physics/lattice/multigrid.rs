@@ -8,6 +8,7 @@ use super::{Lattice, PORTION, quad, range, springs};
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::simd::{Isa, isa};
+use crate::topology::neighbours::{DECODED, MOST};
 use crate::topology::sites::Sites;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -17,6 +18,8 @@ pub struct Springs<'a> {
     lattice: &'a Lattice<'a>,
     pairs: Vec<kernel::Pair<f32>>,
     weights: Option<Vec<f32>>,
+    /// By pair: `½ k n nᵀ` of a bond between sites of weight 1.
+    stiffness: Vec<[[f64; 3]; 3]>,
 }
 
 impl<'a> Springs<'a> {
@@ -31,16 +34,30 @@ impl<'a> Springs<'a> {
         let pairs = lattice.scaled.iter().map(pair).collect();
         let weights = lattice.sites.weights.as_ref();
         let weights = weights.map(|w| w.iter().map(|&w| w as f32).collect());
+        let stiffness = |p: &super::Pair| p.d.map(|a| p.d.map(|b| p.spring * a * b));
         Springs {
+            stiffness: lattice.pairs.iter().map(stiffness).collect(),
             lattice,
             pairs,
             weights,
         }
     }
 
-    /// Stiffness of a bond of pair `p` in `spring · d dᵀ`.
+    /// Share of a bond in [`Springs::stiffness`].
     fn share(&self, site: usize, end: usize) -> f64 {
         0.5 * (self.lattice.weight(site) + self.lattice.weight(end))
+    }
+
+    /// Calls `visit` with every site of the range and its bonds' ends; a missing one is the site itself.
+    fn each_ends(&self, sites: Range<usize>, mut visit: impl FnMut(usize, &[u32])) {
+        let neighbours = &self.lattice.sites.neighbours;
+        let mut table = [0; MOST * DECODED];
+        for start in sites.clone().step_by(DECODED) {
+            let part = start..(start + DECODED).min(sites.end);
+            neighbours.decode(part.clone(), &mut table);
+            let rows = table.chunks_exact(neighbours.coordination());
+            part.zip(rows).for_each(|(site, ends)| visit(site, ends));
+        }
     }
 }
 
@@ -56,25 +73,17 @@ impl Operator<3> for Springs<'_> {
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
-        d.par_iter_mut().enumerate().for_each(|(site, d)| {
-            *d = [0.0; 3];
-            self.each_bond(site, |_, block| (0..3).for_each(|c| d[c] += block[c][c]));
-        });
-    }
-}
-
-impl Springs<'_> {
-    /// Calls `visit` with every bonded neighbour and the bond's stiffness `½ k n nᵀ`.
-    fn each_bond(&self, site: usize, mut visit: impl FnMut(usize, [[f64; 3]; 3])) {
-        for (pair, plus, minus) in self.lattice.bonded(site) {
-            for end in [plus, minus] {
-                if end != site {
-                    let c = self.share(site, end) * pair.spring;
-                    let d = pair.d;
-                    visit(end, d.map(|a| d.map(|b| c * a * b)));
+        d.par_chunks_mut(PORTION).enumerate().for_each(|(c, d)| {
+            let sites = range(c, d.len());
+            self.each_ends(sites.clone(), |site, ends| {
+                let d = &mut d[site - sites.start];
+                *d = [0.0; 3];
+                for (b, &end) in ends.iter().enumerate().filter(|b| *b.1 as usize != site) {
+                    let share = self.share(site, end as usize);
+                    (0..3).for_each(|c| d[c] += share * self.stiffness[b / 2][c][c]);
                 }
-            }
-        }
+            });
+        });
     }
 }
 
@@ -87,31 +96,43 @@ impl Coarsen for Springs<'_> {
     }
 
     fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
-        let (mut columns, mut blocks) = (Vec::with_capacity(19), Vec::with_capacity(19));
-        for site in sites {
-            let mut own = [[0.0; 3]; 3];
-            columns.clear();
-            blocks.clear();
-            self.each_bond(site, |end, block| {
+        let negative = |k: &[[f64; 3]; 3]| k.map(|row| row.map(|v| -v as f32));
+        let unit: Vec<Block> = self.stiffness.iter().map(negative).collect();
+        let uniform = self.weights.is_none();
+        let (mut columns, mut blocks) = ([0; MOST + 1], [[[0.0; 3]; 3]; MOST + 1]);
+        self.each_ends(sites, |site, ends| {
+            let (mut own, mut n) = ([[0.0; 3]; 3], 0);
+            for (b, &end) in ends.iter().enumerate().filter(|b| *b.1 as usize != site) {
+                let k = &self.stiffness[b / 2];
+                let share = if uniform {
+                    1.0
+                } else {
+                    self.share(site, end as usize)
+                };
                 for a in 0..3 {
-                    (0..3).for_each(|b| own[a][b] += block[a][b]);
+                    (0..3).for_each(|c| own[a][c] += share * k[a][c]);
                 }
-                columns.push(end as u32);
-                blocks.push(block.map(|r| r.map(|v| -v as f32)));
-            });
-            columns.push(site as u32);
-            blocks.push(own.map(|r| r.map(|v| v as f32)));
-            visit(site, &columns, &blocks);
-        }
+                columns[n] = end;
+                blocks[n] = match uniform {
+                    true => unit[b / 2],
+                    false => unit[b / 2].map(|row| row.map(|v| share as f32 * v)),
+                };
+                n += 1;
+            }
+            columns[n] = site as u32;
+            blocks[n] = own.map(|row| row.map(|v| v as f32));
+            visit(site, &columns[..=n], &blocks[..=n]);
+        });
     }
 
     fn reach(&self, sites: Range<usize>) -> Range<usize> {
-        let mut reach = sites.clone();
-        for (_, plus, minus) in sites.flat_map(|site| self.lattice.bonded(site)) {
-            reach.start = reach.start.min(plus).min(minus);
-            reach.end = reach.end.max(plus + 1).max(minus + 1);
-        }
-        reach
+        let (mut first, mut last) = (sites.start as u32, sites.end as u32 - 1);
+        self.each_ends(sites, |_, ends| {
+            for &end in ends {
+                (first, last) = (first.min(end), last.max(end));
+            }
+        });
+        first as usize..last as usize + 1
     }
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {

@@ -12,8 +12,8 @@ use crate::physics::lattice::pieces::{GradedLattice, GradedSprings};
 use crate::physics::lattice::{self, Lattice};
 use crate::physics::material::Solid;
 use crate::solve::amg::{Amg, AmgParams};
-use crate::solve::cg::{CgInfo, CgParams, CgStep};
-use crate::solve::fallback::minimise_or_fall_back;
+use crate::solve::cg::{CgInfo, CgParams, CgStep, Goal};
+use crate::solve::fallback::towards_or_fall_back;
 use crate::stage::lattice::{Boundary, Case, build_of, build_pieces};
 use crate::stage::solve::mechanisms::mechanisms;
 use crate::stage::solve::solved::{Moduli, Solved};
@@ -22,6 +22,7 @@ use crate::stage::solve::{Ends, Load, SolveParams};
 use crate::topology::placement::Frame;
 use crate::topology::sites::Grips;
 use crate::volume::Specimen;
+use rayon::prelude::*;
 
 /// Solves one lattice of a specimen.
 ///
@@ -88,8 +89,15 @@ pub fn solve_lattice(
     };
     let model = Lattice::new(&sites, moduli);
     let springs = Springs::new(&model);
-    let firm = case.boundary == Boundary::Firm;
-    let virial = |u: &[[f64; 3]], s| match !firm || sites.fully_coordinated(s) {
+    // Which sites count, once: the stress is asked for in every iteration.
+    let counts: Option<Vec<bool>> = (case.boundary == Boundary::Firm).then(|| {
+        let sites = &sites;
+        (0..sites.len())
+            .into_par_iter()
+            .map(|s| sites.fully_coordinated(s))
+            .collect()
+    });
+    let virial = |u: &[[f64; 3]], s| match counts.as_ref().is_none_or(|counts| counts[s]) {
         true => model.site_virial(u, s),
         false => 0.0,
     };
@@ -158,17 +166,18 @@ fn solve_model(
     };
     let (held, mut u) = supports(laid, params, loaded.displacement_mm);
     let cg = CgParams {
-        // Firm's headline is a linear functional: off to first order in the energy norm, so the energy must be known
-        // to the square of the tolerance.
-        energy_tolerance: match case.boundary {
-            Boundary::Firm => params.tolerance.powi(2),
-            _ => params.tolerance,
-        },
+        energy_tolerance: params.tolerance,
         max_iterations: params.max_iterations,
         ..CgParams::default()
     };
+    let stress = |u: &[[f64; 3]]| sum_virial(virial, u);
+    // Firm's headline is a linear functional, off to first order where the energy is off to second.
+    let goal: Option<Goal<3>> = match case.boundary {
+        Boundary::Firm => Some(&stress),
+        _ => None,
+    };
     let amg = Amg::new(springs, &held, &AmgParams::lattice(case.lp_mm));
-    let info = minimise_or_fall_back(model, &held, &amg, &mut u, &cg, observe);
+    let info = towards_or_fall_back(model, &held, &amg, &mut u, &cg, goal, observe);
     Solved {
         sites: laid.indices.len(),
         dropped: laid.dropped,
@@ -176,7 +185,7 @@ fn solve_model(
         iterations: info.iterations,
         residual: info.residual,
         ended: info.ended,
-        moduli: assess(model, virial, laid, case.boundary, &loaded, &u, &info),
+        moduli: assess(model, virial, laid, &loaded, &u, &info),
         mechanisms: None,
     }
 }
@@ -203,6 +212,11 @@ fn one_ratio(tissue: &Tissue) -> Result<(Solid, Option<&[f32]>)> {
             )),
         },
     }
+}
+
+/// The virial of all sites that count, in N mm.
+fn sum_virial(virial: &Virial, u: &[[f64; 3]]) -> f64 {
+    sum_chunks(u.len(), |range| range.map(|s| virial(u, s)).sum())
 }
 
 /// Which unknowns are held, and a start that meets them: the field of a homogeneous bar.
@@ -232,7 +246,6 @@ fn assess(
     model: &impl Operator<3>,
     virial: &Virial,
     laid: &Laid,
-    boundary: Boundary,
     loaded: &Loaded,
     u: &[[f64; 3]],
     info: &CgInfo,
@@ -242,14 +255,12 @@ fn assess(
     model.apply(u, &mut force);
     let high = |s: &usize| laid.plane(*s) >= laid.grips.high;
     let reaction: f64 = (0..sites).filter(high).map(|s| force[s][axis]).sum();
-    let virial = sum_chunks(sites, |range| range.map(|s| virial(u, s)).sum());
     let from_energy_mpa = loaded.from_energy(info.energy);
-    let from_stress_mpa = loaded.from_virial(virial);
+    let from_stress_mpa = loaded.from_virial(sum_virial(virial, u));
     let relative = info.energy_error / info.energy;
-    let (e_app_mpa, algebraic_error_mpa) = if boundary == Boundary::Firm {
-        (from_stress_mpa, relative.sqrt() * from_stress_mpa.abs())
-    } else {
-        (from_energy_mpa, relative * from_energy_mpa)
+    let (e_app_mpa, algebraic_error_mpa) = match info.goal_error {
+        Some(error) => (from_stress_mpa, loaded.from_virial(error).abs()),
+        None => (from_energy_mpa, relative * from_energy_mpa),
     };
     Moduli {
         e_app_mpa,

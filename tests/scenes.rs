@@ -322,7 +322,6 @@ fn a_least_density_stops_resorption() {
 
 /// The example scene of a scan's slice, on a sample scan that was segmented as its first lines say.
 #[test]
-#[ignore = "not yet measured in the default run"]
 fn a_slice_of_a_segmented_scan_remodels() {
     let dir = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

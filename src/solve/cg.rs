@@ -104,7 +104,7 @@ pub fn minimise<const D: usize>(
 }
 
 /// [`minimise`], to the accuracy of a goal. Iteration `j` changes it by `α_j J(p_j)`, exactly; what later iterations will
-/// change it by is estimated from the sizes of the past changes ([`EnergyTail::estimate_beside`]). Their signs may differ,
+/// change it by is estimated from the sizes of the past changes ([`EnergyTail::goal_estimate`]). Their signs may differ,
 /// so this errs on the safe side. The energy must have met the same tolerance.
 #[allow(clippy::too_many_arguments)] // minimise's, and the goal
 pub fn minimise_towards<const D: usize>(

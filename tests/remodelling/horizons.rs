@@ -190,7 +190,6 @@ fn a5_fixed_horizon_on_nearly_unit_squares() {
 
 /// Steps that grow as densities settle: few, and near what short ones find.
 #[test]
-#[ignore = "not yet measured in the default run"]
 fn long_steps_stay_near_short_ones() {
     let square = Square {
         steps: [0.06; 4],

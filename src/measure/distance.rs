@@ -105,14 +105,7 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Grid;
-
-    fn mask(n: [usize; 3], spacing: [f64; 3], bone: impl Fn([usize; 3]) -> bool) -> Volume<u8> {
-        let grid = Grid::new(n, spacing);
-        let voxels = (0..grid.len())
-            .map(|at| u8::from(bone([at % n[0], at / n[0] % n[1], at / (n[0] * n[1])])));
-        Volume::from_vec(grid, voxels.collect())
-    }
+    use crate::measure::made::mask;
 
     #[test]
     fn distances_are_those_of_a_search_also_for_unequal_spacing() {

@@ -5,6 +5,8 @@ pub mod distance;
 pub mod extrapolate;
 pub mod fabric;
 pub mod ffb;
+#[cfg(test)]
+mod made;
 pub mod morphometry;
 pub mod pistoia;
 pub mod row;

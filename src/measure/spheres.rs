@@ -238,14 +238,7 @@ fn spread(values: impl Iterator<Item = f64>) -> Option<Spread> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Grid;
-
-    fn mask(n: [usize; 3], spacing: [f64; 3], bone: impl Fn([usize; 3]) -> bool) -> Volume<u8> {
-        let grid = Grid::new(n, spacing);
-        let voxels = (0..grid.len())
-            .map(|at| u8::from(bone([at % n[0], at / n[0] % n[1], at / (n[0] * n[1])])));
-        Volume::from_vec(grid, voxels.collect())
-    }
+    use crate::measure::made::mask;
 
     /// All spheres at all voxels, each voxel the largest that covers it.
     fn by_search(m: &Volume<u8>) -> Vec<f32> {

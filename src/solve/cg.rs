@@ -203,6 +203,16 @@ pub(super) fn met(params: &CgParams, error: Option<f64>, left: f64) -> Option<En
     })
 }
 
+/// What to state as the excess of `energy` over its minimum.
+pub(super) fn energy_error(ended: Ended, tail: &EnergyTail, energy: f64, start_norm: f64) -> f64 {
+    match (ended, tail.estimate()) {
+        (Ended::Faint, _) => energy,
+        (_, Some(e)) => e,
+        (_, None) if start_norm > 0.0 => f64::INFINITY,
+        _ => 0.0,
+    }
+}
+
 fn finish<const D: usize>(
     operator: &impl Operator<D>,
     held: &Held,
@@ -221,18 +231,12 @@ fn finish<const D: usize>(
     } else {
         0.0
     };
-    let energy_error = match (ended, tail.estimate()) {
-        (Ended::Faint, _) => energy,
-        (_, Some(e)) => e,
-        (_, None) if start_norm > 0.0 => f64::INFINITY,
-        _ => 0.0,
-    };
     CgInfo {
         ended,
         iterations,
         residual,
         energy,
-        energy_error,
+        energy_error: energy_error(ended, tail, energy, start_norm),
         goal_error: None,
     }
 }

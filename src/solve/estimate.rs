@@ -25,7 +25,7 @@ pub struct EnergyTail {
     last: (f64, f64),
     estimate: Option<f64>,
     /// `J(α p)² / (α rᵀz)` of the last iterations: squared change of a functional per decrease.
-    sensitivity: Vec<f64>,
+    sensitivity: [f64; RECENT],
 }
 
 impl Default for EnergyTail {
@@ -38,7 +38,7 @@ impl Default for EnergyTail {
             phi: 1.0,
             last: (0.0, 0.0),
             estimate: None,
-            sensitivity: Vec::new(),
+            sensitivity: [0.0; RECENT],
         }
     }
 }
@@ -76,7 +76,8 @@ impl EnergyTail {
     /// Records what that iteration changed a functional by.
     pub fn push_change(&mut self, change: f64) {
         let (alpha, rz) = self.last;
-        self.sensitivity.push(change * change / (alpha * rz));
+        self.sensitivity.rotate_left(1);
+        self.sensitivity[RECENT - 1] = change * change / (alpha * rz);
     }
 
     /// Decrease since the start.
@@ -108,8 +109,7 @@ impl EnergyTail {
     /// Estimated error of the functional: the energy norm of the error times the most that a unit of it has lately
     /// changed the functional by.
     pub fn goal_estimate(&self) -> Option<f64> {
-        let recent = &self.sensitivity[self.sensitivity.len().saturating_sub(RECENT)..];
-        let most = recent.iter().copied().fold(0.0, f64::max);
+        let most = self.sensitivity.into_iter().fold(0.0, f64::max);
         Some((most * self.estimate?).sqrt())
     }
 

@@ -7,8 +7,8 @@ use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, Goal, minimise_towards};
 use crate::solve::jacobi::Jacobi;
 use crate::solve::mixed;
 
-/// [`minimise`](crate::solve::cg::minimise) with `preconditioner`; should that break down, from where it came to with the diagonal. Iterations are
-/// those of both.
+/// [`minimise`](crate::solve::cg::minimise) with `preconditioner`; should that break down, from where it came to with the
+/// diagonal. Iterations are those of both.
 pub fn minimise_or_fall_back<const D: usize>(
     operator: &impl Operator<D>,
     held: &Held,

@@ -8,7 +8,7 @@ use crate::operator::SinglePreconditioner;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::par::{CHUNK, sum_chunks};
-use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, NOTHING, met};
+use crate::solve::cg::{CgInfo, CgParams, CgStep, Ended, NOTHING, energy_error, met};
 use crate::solve::estimate::EnergyTail;
 use rayon::prelude::*;
 
@@ -101,12 +101,7 @@ pub fn minimise(
             0.0
         },
         energy: end.energy,
-        energy_error: match (ended, tail.estimate()) {
-            (Ended::Faint, _) => end.energy,
-            (_, Some(e)) => e,
-            (_, None) if start.norm > 0.0 => f64::INFINITY,
-            _ => 0.0,
-        },
+        energy_error: energy_error(ended, &tail, end.energy, start.norm),
         goal_error: None,
     }
 }

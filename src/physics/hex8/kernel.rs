@@ -226,16 +226,13 @@ impl Elements<'_> {
     /// Factor and kind of all elements `around` node `i` of a segment, if they are alike. There is one at least.
     #[inline(always)]
     pub fn alike(self, around: u8, rows: &[u32; 9], i: usize) -> Option<(f32, usize)> {
-        let first = self.of(low_corner(rows, i, around.trailing_zeros() as usize & 7));
+        let lowest = around.trailing_zeros() as usize & 7;
+        let first = self.of(low_corner(rows, i, lowest));
         let mut alike = true;
         for e in 0..8 {
             // Where there is no element, the first one again: no branch.
             let there = around >> e & 1 == 1;
-            let e = if there {
-                e
-            } else {
-                around.trailing_zeros() as usize & 7
-            };
+            let e = if there { e } else { lowest };
             alike &= self.of(low_corner(rows, i, e)) == first;
         }
         alike.then_some(first)

@@ -20,6 +20,8 @@ pub struct Springs<'a> {
     weights: Option<Vec<f32>>,
     /// By pair: `½ k n nᵀ` of a bond between sites of weight 1.
     stiffness: Vec<[[f64; 3]; 3]>,
+    /// Its negative, what such a bond couples its ends by.
+    coupling: Vec<Block>,
 }
 
 impl<'a> Springs<'a> {
@@ -35,8 +37,11 @@ impl<'a> Springs<'a> {
         let weights = lattice.sites.weights.as_ref();
         let weights = weights.map(|w| w.iter().map(|&w| w as f32).collect());
         let stiffness = |p: &super::Pair| p.d.map(|a| p.d.map(|b| p.spring * a * b));
+        let stiffness: Vec<_> = lattice.pairs.iter().map(stiffness).collect();
+        let negative = |k: &[[f64; 3]; 3]| k.map(|row| row.map(|v| -v as f32));
         Springs {
-            stiffness: lattice.pairs.iter().map(stiffness).collect(),
+            coupling: stiffness.iter().map(negative).collect(),
+            stiffness,
             lattice,
             pairs,
             weights,
@@ -96,8 +101,6 @@ impl Coarsen for Springs<'_> {
     }
 
     fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
-        let negative = |k: &[[f64; 3]; 3]| k.map(|row| row.map(|v| -v as f32));
-        let unit: Vec<Block> = self.stiffness.iter().map(negative).collect();
         let uniform = self.weights.is_none();
         let (mut columns, mut blocks) = ([0; MOST + 1], [[[0.0; 3]; 3]; MOST + 1]);
         self.each_ends(sites, |site, ends| {
@@ -114,8 +117,8 @@ impl Coarsen for Springs<'_> {
                 }
                 columns[n] = end;
                 blocks[n] = match uniform {
-                    true => unit[b / 2],
-                    false => unit[b / 2].map(|row| row.map(|v| share as f32 * v)),
+                    true => self.coupling[b / 2],
+                    false => self.coupling[b / 2].map(|row| row.map(|v| share as f32 * v)),
                 };
                 n += 1;
             }

@@ -6,10 +6,13 @@ use bonepd_ct::run::Outcome;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    bonepd_ct::run::host::give_freed_memory_back();
     match cli::run() {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::NotConverged) => {
-            eprintln!("not converged: results are written, the rows are marked");
+            eprintln!(
+                "not converged, or the error asked for not met: results are written, the rows say so"
+            );
             ExitCode::from(1)
         }
         Ok(Outcome::SomeFailed(scans)) => {

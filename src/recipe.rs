@@ -13,6 +13,9 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Recipe {
+    /// Stated error asked for, algebraic and discretisation (0.03 is 3 %). Method and resolution then follow from it, and
+    /// what `[lattice]` says is not used.
+    pub error: Option<f64>,
     pub segment: SegmentParams,
     pub lattice: LatticeParams,
     pub solve: SolveParams,
@@ -44,6 +47,13 @@ impl Recipe {
 
     /// Refuses values no stage can use.
     pub fn check(&self) -> Result<()> {
+        if self.error.is_some_and(|e| !(e > 0.0 && e < 1.0)) {
+            return Err(Error::setting(
+                "error",
+                format!("not usable: {}", self.error.unwrap_or_default()),
+                "give a relative error between 0 and 1 (0.03 is 3 %)",
+            ));
+        }
         self.segment.check()?;
         self.lattice.check()?;
         self.solve.check()
@@ -123,6 +133,8 @@ mod tests {
     fn a_value_no_stage_can_use_is_refused() {
         let words = parse("[solve]\npoisson = 0.5").unwrap_err().to_string();
         assert!(words.contains("poisson"), "{words}");
+        let words = parse("error = 3.0").unwrap_err().to_string();
+        assert!(words.contains("0.03 is 3 %"), "{words}");
     }
 
     #[test]

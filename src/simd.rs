@@ -1,6 +1,8 @@
 //! Owns eight-lane arithmetic chosen at run time, so that one binary is fast on every processor: AVX-512, AVX2 with
 //! fused multiply-add, or plain arrays that the compiler maps to what the target has.
 
+use std::ops::Sub;
+
 /// The instruction set in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Isa {
@@ -32,7 +34,7 @@ pub fn isa() -> Isa {
 /// for the lanes that are read or written. No alignment is asked for.
 #[allow(clippy::missing_safety_doc)] // one contract for all methods, above
 pub trait Lanes: Copy {
-    type S: Copy + Default;
+    type S: Copy + Default + Sub<Output = Self::S>;
     type Four: Copy;
     unsafe fn zero() -> Self;
     unsafe fn zero4() -> Self::Four;
@@ -41,8 +43,9 @@ pub trait Lanes: Copy {
     unsafe fn store(self, p: *mut Self::S);
     /// `self + a b`.
     unsafe fn fma(self, a: Self, b: Self) -> Self;
-    /// `four + a[0..4] · x[0]`.
-    unsafe fn fma4(four: Self::Four, a: *const Self::S, x: *const Self::S) -> Self::Four;
+    /// `four + a[0..4] · x`.
+    unsafe fn fma4(four: Self::Four, a: *const Self::S, x: Self::S) -> Self::Four;
+    unsafe fn sub(self, b: Self) -> Self;
     /// `four + s four_b`.
     unsafe fn scale4(four: Self::Four, s: Self::S, b: Self::Four) -> Self::Four;
     /// The sums over the lanes of `a`, `b`, `c`, plus the first three lanes of `four`.
@@ -86,8 +89,15 @@ macro_rules! portable {
                 self
             }
             #[inline(always)]
-            unsafe fn fma4(mut four: [$s; 4], a: *const $s, x: *const $s) -> [$s; 4] {
-                let (a, x) = unsafe { (a.cast::<[$s; 4]>().read_unaligned(), *x) };
+            unsafe fn sub(mut self, b: Self) -> Self {
+                for l in 0..8 {
+                    self.0[l] -= b.0[l];
+                }
+                self
+            }
+            #[inline(always)]
+            unsafe fn fma4(mut four: [$s; 4], a: *const $s, x: $s) -> [$s; 4] {
+                let a = unsafe { a.cast::<[$s; 4]>().read_unaligned() };
                 for l in 0..4 {
                     four[l] += a[l] * x;
                 }
@@ -167,8 +177,12 @@ mod x86 {
             unsafe { Avx512F64(_mm512_fmadd_pd(a.0, b.0, self.0)) }
         }
         #[inline(always)]
-        unsafe fn fma4(four: __m256d, a: *const f64, x: *const f64) -> __m256d {
-            unsafe { _mm256_fmadd_pd(_mm256_loadu_pd(a), _mm256_broadcast_sd(&*x), four) }
+        unsafe fn sub(self, b: Self) -> Self {
+            unsafe { Avx512F64(_mm512_sub_pd(self.0, b.0)) }
+        }
+        #[inline(always)]
+        unsafe fn fma4(four: __m256d, a: *const f64, x: f64) -> __m256d {
+            unsafe { _mm256_fmadd_pd(_mm256_loadu_pd(a), _mm256_set1_pd(x), four) }
         }
         #[inline(always)]
         unsafe fn scale4(four: __m256d, s: f64, b: __m256d) -> __m256d {
@@ -223,8 +237,12 @@ mod x86 {
             }
         }
         #[inline(always)]
-        unsafe fn fma4(four: __m256d, a: *const f64, x: *const f64) -> __m256d {
-            unsafe { _mm256_fmadd_pd(_mm256_loadu_pd(a), _mm256_broadcast_sd(&*x), four) }
+        unsafe fn sub(self, b: Self) -> Self {
+            unsafe { Avx2F64(_mm256_sub_pd(self.0, b.0), _mm256_sub_pd(self.1, b.1)) }
+        }
+        #[inline(always)]
+        unsafe fn fma4(four: __m256d, a: *const f64, x: f64) -> __m256d {
+            unsafe { _mm256_fmadd_pd(_mm256_loadu_pd(a), _mm256_set1_pd(x), four) }
         }
         #[inline(always)]
         unsafe fn scale4(four: __m256d, s: f64, b: __m256d) -> __m256d {
@@ -271,8 +289,12 @@ mod x86 {
             unsafe { Avx2F32(_mm256_fmadd_ps(a.0, b.0, self.0)) }
         }
         #[inline(always)]
-        unsafe fn fma4(four: __m128, a: *const f32, x: *const f32) -> __m128 {
-            unsafe { _mm_fmadd_ps(_mm_loadu_ps(a), _mm_broadcast_ss(&*x), four) }
+        unsafe fn sub(self, b: Self) -> Self {
+            unsafe { Avx2F32(_mm256_sub_ps(self.0, b.0)) }
+        }
+        #[inline(always)]
+        unsafe fn fma4(four: __m128, a: *const f32, x: f32) -> __m128 {
+            unsafe { _mm_fmadd_ps(_mm_loadu_ps(a), _mm_set1_ps(x), four) }
         }
         #[inline(always)]
         unsafe fn scale4(four: __m128, s: f32, b: __m128) -> __m128 {

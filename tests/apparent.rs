@@ -90,7 +90,8 @@ fn sheets() -> Specimen {
 
 /// Every structure, with end planes and with thick grips (where whole pieces are held and others are mechanisms): as
 /// few iterations as multigrid takes; the diagonal, which would take over if it broke down, takes 150 to 300. Measured: 4
-/// to 40, and 66 on FCC between thick grips, a mechanism, whose energy must fall to 1e-10 of the start's.
+/// to 64, and 125 on FCC between thick grips, a mechanism, whose energy must fall to 1e-10 of the start's: single-precision
+/// vectors begin anew each time it has fallen by a thousand (in double precision 66).
 #[test]
 fn multigrid_serves_every_lattice() {
     for structure in Structure::ALL {
@@ -106,7 +107,12 @@ fn multigrid_serves_every_lattice() {
             let s = solved(&sheets(), structure, boundary, &params);
             let told = format!("{structure:?} {boundary:?} {grip_mm}: {s:?}");
             println!("{told}");
-            assert!(s.ended.converged() && s.iterations <= 80, "{told}");
+            let most = if structure == Structure::Fcc && grip_mm > 0.0 {
+                140
+            } else {
+                80
+            };
+            assert!(s.ended.converged() && s.iterations <= most, "{told}");
         }
     }
 }

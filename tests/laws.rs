@@ -9,7 +9,7 @@ use bonepd_ct::physics::hex8::element::{Integration, stiffness};
 use bonepd_ct::physics::hex8::graded::Graded;
 use bonepd_ct::physics::lattice::pieces::GradedLattice;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-use bonepd_ct::solve::cg::{CgParams, minimise};
+use bonepd_ct::solve::cg::{CgParams, ENERGY_ALONE, minimise};
 use bonepd_ct::solve::jacobi::Jacobi;
 use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build, build_pieces};
 use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
@@ -309,7 +309,15 @@ fn results_do_not_depend_on_the_number_of_threads() {
                     energy_tolerance: 0.0,
                     ..CgParams::default()
                 };
-                minimise(&operator, &held, &jacobi, &mut u, &params, |_| ());
+                minimise(
+                    &operator,
+                    &held,
+                    &jacobi,
+                    &mut u,
+                    &params,
+                    ENERGY_ALONE,
+                    |_| (),
+                );
                 u
             })
         };

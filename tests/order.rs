@@ -8,7 +8,7 @@ use bonepd_ct::operator::held::{Constrained, Held};
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::Integration;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-use bonepd_ct::solve::cg::{CgParams, minimise};
+use bonepd_ct::solve::cg::{CgParams, ENERGY_ALONE, minimise};
 use bonepd_ct::solve::jacobi::Jacobi;
 use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build};
 use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
@@ -55,9 +55,17 @@ fn solve(operator: &impl Operator<3>, held: &Held, at: &[[f64; 3]]) -> Vec<[f64;
         ..CgParams::default()
     };
     assert!(
-        minimise(operator, held, &jacobi, &mut u, &params, |_| ())
-            .ended
-            .converged()
+        minimise(
+            operator,
+            held,
+            &jacobi,
+            &mut u,
+            &params,
+            ENERGY_ALONE,
+            |_| ()
+        )
+        .ended
+        .converged()
     );
     u
 }

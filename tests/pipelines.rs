@@ -53,6 +53,24 @@ fn near(found: f64, expected: f64, tolerance: f64) {
     );
 }
 
+/// The error asked for decides what is solved; the scan that carries no load has none.
+#[test]
+fn to_a_stated_error() {
+    let (_dir, rows) = run_recipe("to-an-error.toml", &["trabecular.nii.gz", "gap.nii.gz"]);
+    let met = |r: &&Row| {
+        let stated = r.algebraic_error_mpa.unwrap_or(f64::INFINITY)
+            + r.discretization_error_mpa.unwrap_or(f64::INFINITY);
+        stated < 0.05 * r.e_app_mpa.unwrap_or(0.0)
+    };
+    assert!(
+        rows.iter()
+            .filter(|r| r.scan == "trabecular")
+            .any(|r| met(&r))
+    );
+    let mut gap = rows.iter().filter(|r| r.scan == "gap").peekable();
+    assert!(gap.peek().is_some() && gap.all(|r| r.e_app_mpa == Some(0.0)));
+}
+
 #[test]
 fn the_papers_protocol() {
     let (_dir, rows) = run_recipe("paper.toml", &["trabecular.nii.gz"]);

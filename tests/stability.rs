@@ -11,7 +11,7 @@ use bonepd_ct::operator::sparse::Sparse;
 use bonepd_ct::physics::hex8::element::Integration;
 use bonepd_ct::physics::hex8::graded::Graded;
 use bonepd_ct::solve::amg::{Amg, AmgParams};
-use bonepd_ct::solve::cg::{CgParams, Ended};
+use bonepd_ct::solve::cg::{CgParams, ENERGY_ALONE, Ended};
 use bonepd_ct::solve::direct::DirectLlt;
 use bonepd_ct::solve::fallback::minimise_or_fall_back;
 use bonepd_ct::stage::lattice::{Boundary, Case as LatticeCase, Structure};
@@ -462,7 +462,8 @@ fn contrast(soft: f32) -> (usize, f64, f64) {
             ..CgParams::default()
         };
         let mut u = start.clone();
-        let info = minimise_or_fall_back(&model, &held, &amg, &mut u, &params, |_| ());
+        let info =
+            minimise_or_fall_back(&model, &held, &amg, &mut u, &params, ENERGY_ALONE, |_| ());
         assert!(info.ended.converged());
         (
             info.iterations,

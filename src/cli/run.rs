@@ -45,6 +45,10 @@ pub struct RunArgs {
     /// Run only the scan of this name: one job of many on a cluster
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
+    /// Choose method and resolution of each scan so that its stated error, algebraic and discretisation, stays below this,
+    /// as 3% or 0.03; exit 1 where it cannot be met
+    #[arg(long, value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "coarsen", "lp", "boundary", "structure"])]
+    error: Option<f64>,
     #[command(flatten)]
     segment: SegmentSettings,
     #[command(flatten)]
@@ -55,6 +59,7 @@ pub struct RunArgs {
 
 pub fn run(args: &RunArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut recipe = Recipe::read(&args.recipe)?;
+    recipe.error = args.error.or(recipe.error);
     args.segment.apply(&mut recipe.segment)?;
     args.lattice.apply(&mut recipe.lattice)?;
     args.solve.apply(&mut recipe.solve)?;

@@ -1,6 +1,8 @@
 //! Owns what algebraic multigrid needs of its finest level, beyond the operator itself.
 
-use super::Operator;
+use super::{MixedPrecision, Operator};
+use crate::par::CHUNK;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// The coupling of two sites: `block[a][b]` is the force on component `a` of the row's site per unit displacement of
@@ -35,4 +37,44 @@ pub trait Coarsen: Operator<3> {
     /// A bound of the largest eigenvalue of `D⁻¹A`, `D` the 3 × 3 diagonal blocks, that holds whatever is held. From
     /// parts: where `A = Σ A_e` and each part's eigenvalues are below the bound, so are those of the sum.
     fn eigenvalue_bound(&self) -> f64;
+}
+
+/// What can be applied to any range of rows needs no more than that.
+impl<O: Coarsen> MixedPrecision for O {
+    fn apply_single(
+        &self,
+        x: &[[f32; 3]],
+        y: &mut [[f32; 3]],
+        finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
+    ) -> f64 {
+        let parts: Vec<f64> = y
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .map(|(c, y)| {
+                let first = c * CHUNK;
+                self.rows_f32(first..first + y.len(), x, y);
+                finish(first, y)
+            })
+            .collect();
+        parts.iter().sum()
+    }
+
+    fn each_part(
+        &self,
+        x: &[[f64; 3]],
+        out: &mut [[f32; 3]],
+        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        let parts: Vec<[f64; 2]> = out
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .map(|(c, out)| {
+                let first = c * CHUNK;
+                let mut image = vec![[0.0; 3]; out.len()];
+                self.rows_f64(first..first + out.len(), x, &mut image);
+                take(first, &image, out)
+            })
+            .collect();
+        [0, 1].map(|k| parts.iter().map(|p| p[k]).sum())
+    }
 }

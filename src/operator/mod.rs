@@ -28,3 +28,30 @@ pub trait SinglePreconditioner<const D: usize>: Sync {
     /// `z ≈ A⁻¹ r`, zero in held components; `spare` is room for one vector more. Both change places at will.
     fn apply_single(&self, r: &[[f32; D]], z: &mut Vec<[f32; D]>, spare: &mut Vec<[f32; D]>);
 }
+
+/// An operator for solvers that keep most of their vectors in single precision.
+pub trait MixedPrecision: Operator<3> {
+    /// `y = A x` in single precision, part by part. Each part, with its first site, is given to `finish` while it is in
+    /// the cache; what that returns is added up in the order of the parts.
+    fn apply_single(
+        &self,
+        x: &[[f32; 3]],
+        y: &mut [[f32; 3]],
+        finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
+    ) -> f64;
+
+    /// `A x` in double precision, part by part, never all of it at once: `take` has each part's first site, `A x` there
+    /// and as much of `out`. What it returns is added up in the order of the parts.
+    fn each_part(
+        &self,
+        x: &[[f64; 3]],
+        out: &mut [[f32; 3]],
+        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+    ) -> [f64; 2];
+}
+
+/// A linear functional of the unknowns.
+pub trait Functional<const D: usize>: Sync {
+    fn of(&self, u: &[[f64; D]]) -> f64;
+    fn of_single(&self, u: &[[f32; D]]) -> f64;
+}

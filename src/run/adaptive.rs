@@ -147,7 +147,8 @@ fn best(rows: &[Row]) -> Option<(&Row, f64)> {
     stated.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-fn meets(rows: &[Row], target: f64) -> bool {
+/// Whether the stated error of one of the rows is at most `target`.
+pub fn meets(rows: &[Row], target: f64) -> bool {
     best(rows).is_some_and(|(_, error)| error <= target)
 }
 

@@ -4,13 +4,13 @@ use crate::error::{Error, Result};
 use crate::io::{atomic, table};
 use crate::measure::row::Row;
 use crate::recipe::Recipe;
-use crate::run::estimate::{Estimate, estimate};
+use crate::run::estimate::{Estimate, estimate, of_specimen};
 use crate::run::queue;
 use crate::run::report::Failure;
 use crate::run::results::Results;
 use crate::run::scans::{self, ScanJob, Selection};
 use crate::run::session::Session;
-use crate::run::{Outcome, host, lattice, report, segment, solve};
+use crate::run::{Outcome, adaptive, host, lattice, report, segment, solve};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -31,7 +31,7 @@ pub struct Resources {
 pub struct ScanResult {
     pub scan: String,
     pub input: PathBuf,
-    /// `done`, `not converged`, `failed`, or `planned` in a dry run.
+    /// `done`, `not converged`, `error not met`, `failed`, or `planned` in a dry run.
     pub state: &'static str,
     pub error: Option<String>,
     pub rows: usize,
@@ -59,7 +59,8 @@ pub fn cohort(
         .map(|job| estimate(&job.input, job.segment.spacing_mm, recipe))
         .collect();
     if session.dry_run {
-        return Ok((Outcome::Done, plan(&jobs, &estimates, out, session)));
+        let results = plan(recipe, &jobs, &estimates, out, session);
+        return Ok((outcome(&results), results));
     }
     let run = Run {
         recipe,
@@ -174,7 +175,7 @@ impl Run<'_> {
             .iter()
             .zip(estimates)
             .zip(done.drain(..))
-            .map(|((job, estimate), solved)| result(job, *estimate, solved))
+            .map(|((job, estimate), solved)| result(job, *estimate, solved, self.recipe.error))
             .collect();
         Ok((outcome(&results), results))
     }
@@ -186,7 +187,10 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
     if lattice::settings(dir).ok().as_ref() != Some(&recipe.lattice) || session.force {
         lattice::remember(dir, &recipe.lattice)?;
     }
-    let mut rows = solve::solve(dir, &recipe.lattice, &recipe.solve, session)?;
+    let mut rows = match recipe.error {
+        Some(target) => adaptive::solve_to(dir, target, &recipe.solve, session)?.rows,
+        None => solve::solve(dir, &recipe.lattice, &recipe.solve, session)?,
+    };
     for row in &mut rows {
         row.group.clone_from(&job.group);
         row.subject.clone_from(&job.subject);
@@ -218,8 +222,19 @@ fn in_words(rows: &[Row]) -> String {
     }
 }
 
-fn result(job: &ScanJob, estimate: Estimate, solved: Option<Result<Vec<Row>>>) -> ScanResult {
+/// `target`: the stated error asked for, if any.
+fn result(
+    job: &ScanJob,
+    estimate: Estimate,
+    solved: Option<Result<Vec<Row>>>,
+    target: Option<f64>,
+) -> ScanResult {
+    let missed = |rows: &[Row]| {
+        let broken = rows.iter().all(|row| row.e_app_mpa == Some(0.0));
+        target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
+    };
     let (state, error, rows) = match solved {
+        Some(Ok(rows)) if missed(&rows) => ("error not met", None, rows.len()),
         Some(Ok(rows)) if rows.iter().any(|row| row.converged == Some(false)) => {
             ("not converged", None, rows.len())
         }
@@ -238,29 +253,56 @@ fn result(job: &ScanJob, estimate: Estimate, solved: Option<Result<Vec<Row>>>) -
 }
 
 fn outcome(results: &[ScanResult]) -> Outcome {
-    let in_state = |state| results.iter().filter(move |r| r.state == state);
+    let in_state = |state: &'static str| results.iter().filter(move |r| r.state == state);
     let failed: Vec<String> = in_state("failed").map(|r| r.scan.clone()).collect();
-    match (failed.is_empty(), in_state("not converged").next()) {
+    let short = ["not converged", "error not met"];
+    match (
+        failed.is_empty(),
+        short.iter().any(|s| in_state(s).next().is_some()),
+    ) {
         (false, _) => Outcome::SomeFailed(failed),
-        (true, Some(_)) => Outcome::NotConverged,
-        (true, None) => Outcome::Done,
+        (true, true) => Outcome::NotConverged,
+        (true, false) => Outcome::Done,
     }
 }
 
-/// What would run, with rough needs.
+/// What would run. Every scan is read and segmented, so what its solves need is known.
 fn plan(
+    recipe: &Recipe,
     jobs: &[ScanJob],
     estimates: &[Estimate],
     out: &Path,
     session: &Session,
 ) -> Vec<ScanResult> {
-    for (job, e) in jobs.iter().zip(estimates) {
-        session.say(format!(
-            "{} <- {}: {e}",
-            out.join(&job.name).display(),
-            job.input.display()
-        ));
+    let bar = session.bar(jobs.len() as u64, "scans");
+    let mut results = Vec::new();
+    for (job, first) in jobs.iter().zip(estimates) {
+        let to = out.join(&job.name);
+        let quiet = Session {
+            quiet: true,
+            ..session.clone()
+        };
+        let known = segment::in_memory(&job.input, Some(&job.name), &job.segment, &quiet)
+            .and_then(|(_, s)| of_specimen(&s.specimen, first, recipe));
+        bar.inc(1);
+        let estimate = *known.as_ref().unwrap_or(first);
+        results.push(match &known {
+            Ok(e) => {
+                let (to, from) = (to.display(), job.input.display());
+                session.say(format!("{to} <- {from}: {e}"));
+                result(job, estimate, None, None)
+            }
+            Err(e) => {
+                session.warn(format!("{} would fail: {e}", job.name));
+                result(job, estimate, Some(Err(e.clone())), None)
+            }
+        });
+        if let Some(free) = host::available_mib().filter(|free| *free < estimate.memory_mib) {
+            session.warn(format!("{} will not fit: {free:.0} MiB are free", job.name));
+        }
     }
+    bar.finish_and_clear();
+    let estimates: Vec<Estimate> = results.iter().map(|r| r.estimate).collect();
     let seconds = estimates.iter().filter_map(|e| e.time_s).sum::<f64>();
     let time = match seconds {
         s if s < 90.0 => format!("{s:.0} s"),
@@ -276,6 +318,5 @@ fn plan(
         "scans: {}; about {time} one after the other{rest}",
         jobs.len()
     ));
-    let planned = jobs.iter().zip(estimates);
-    planned.map(|(job, e)| result(job, *e, None)).collect()
+    results
 }

@@ -1,29 +1,32 @@
-//! Owns rough needs of a scan before anything is read but its header: memory and time, to plan by, not to promise.
+//! Owns what a scan needs, memory and time: roughly from its header, to share a machine by, and from its bone.
 
+use crate::error::{Error, Result};
 use crate::io::extent;
 use crate::recipe::Recipe;
-use crate::stage::solve::Method;
+use crate::run::host;
+use crate::stage::lattice::{Case, LatticeParams};
+use crate::stage::solve::{Method, SolveParams, need};
+use crate::volume::Specimen;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
+/// Bytes of the program before it reads anything, its threads' stacks and what allocators keep among them.
+const BASE: f64 = 21.4e6;
+
 /// Bytes per voxel while a scan is segmented: grey values, their smoothed copy, labels, mask.
 const BYTES_PER_VOXEL: f64 = 14.0;
 
-/// Bytes per lattice site while solved: 18 neighbours of 4 bytes, six vectors of three 8-byte numbers, indices.
+/// Bytes per lattice site and per hexahedron, before the bone is known.
 const BYTES_PER_SITE: f64 = 260.0;
-
-/// Bytes per hexahedron of voxel FE.
-const BYTES_PER_ELEMENT: f64 = 300.0;
+const BYTES_PER_ELEMENT: f64 = 220.0;
 
 /// Share of candidate sites that a padded lattice of trabecular bone fills: 120 096 of 274 625 measured at LP 0.06 mm.
 const FILLED: f64 = 0.5;
 
-/// Site iterations per second: 120 096 sites, 708 iterations in 10.4 s measured (two cores, other work beside).
-const SITE_ITERATIONS_PER_S: f64 = 8.0e6;
-
-/// Iterations per site along the longest edge: 708 over 65 measured.
-const ITERATIONS_PER_PLANE: f64 = 11.0;
+/// Seconds per lattice site and per hexahedron on two cores: 0.55 s for 120 096 sites, 6.4 s for 1 869 627 elements.
+const S_PER_SITE: f64 = 5e-6;
+const S_PER_ELEMENT: f64 = 3.5e-6;
 
 /// What a scan needs, roughly.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -64,15 +67,15 @@ pub fn estimate(input: &Path, spacing_mm: Option<[f64; 3]>, recipe: &Recipe) -> 
         .map(|(n, h)| [0, 1, 2].map(|a| n[a] as f64 * h[a]));
     let (model_bytes, time_s) = match recipe.solve.method {
         Method::Lattice => lattice(size_mm, recipe),
-        Method::VoxelFe => (
-            voxels.map_or(read, count) * FILLED * BYTES_PER_ELEMENT,
-            None,
-        ),
+        Method::VoxelFe => {
+            let scale = (recipe.solve.refine as f64 / recipe.solve.coarsen as f64).powi(3);
+            let elements = voxels.map_or(read, count) * FILLED * scale;
+            (elements * BYTES_PER_ELEMENT, Some(elements * S_PER_ELEMENT))
+        }
     };
     Estimate {
         voxels: extent.map(|e| e.voxels),
-        memory_mib: (20.0 * 1024.0 * 1024.0 + (read * BYTES_PER_VOXEL).max(model_bytes))
-            / (1024.0 * 1024.0),
+        memory_mib: mib(BASE + (read * BYTES_PER_VOXEL).max(model_bytes)),
         time_s,
     }
 }
@@ -82,15 +85,100 @@ fn lattice(size_mm: Option<[f64; 3]>, recipe: &Recipe) -> (f64, Option<f64>) {
     let Some(size) = size_mm else {
         return (0.0, None);
     };
-    let longest = size.iter().copied().fold(0.0, f64::max);
     let (mut bytes, mut time) = (0.0f64, 0.0);
     for case in recipe.lattice.cases() {
         let cell = case.structure.cell_volume() * case.lp_mm.powi(3);
         let sites = FILLED * size.iter().product::<f64>() / cell;
         bytes = bytes.max(sites * BYTES_PER_SITE);
-        time += sites * ITERATIONS_PER_PLANE * longest / case.lp_mm / SITE_ITERATIONS_PER_S;
+        time += sites * S_PER_SITE;
     }
     (bytes, Some(time))
+}
+
+/// Needs of a scan whose bone is known: the most that one of its solves takes, and reading the scan before.
+///
+/// # Errors
+/// Settings that do not fit the specimen.
+pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Result<Estimate> {
+    let voxels = specimen.bone.grid.len() as f64;
+    let reading = first
+        .voxels
+        .map_or(voxels, |n| n.iter().map(|v| *v as f64).product());
+    let mut bytes = reading * BYTES_PER_VOXEL;
+    for case in cases(&recipe.lattice, &recipe.solve) {
+        bytes = bytes.max(voxels + need::of(specimen, case.as_ref(), &recipe.solve)?);
+    }
+    let time_s = match recipe.solve.method {
+        Method::Lattice => first.time_s,
+        Method::VoxelFe => Some(elements(specimen, &recipe.solve) * S_PER_ELEMENT),
+    };
+    Ok(Estimate {
+        memory_mib: mib(BASE + bytes),
+        time_s,
+        ..*first
+    })
+}
+
+/// Voxel elements, before those without load are dropped.
+fn elements(specimen: &Specimen, params: &SolveParams) -> f64 {
+    let bone = specimen.bv_mm3() / specimen.bone.grid.voxel_mm3();
+    bone * (params.refine as f64 / params.coarsen as f64).powi(3)
+}
+
+fn cases(lattices: &LatticeParams, params: &SolveParams) -> Vec<Option<Case>> {
+    match params.method {
+        Method::Lattice => lattices.cases().into_iter().map(Some).collect(),
+        Method::VoxelFe => vec![None],
+    }
+}
+
+/// Refuses a solve that this machine has no memory for, and says what it has memory for.
+///
+/// # Errors
+/// A solve that needs more than is free.
+pub fn refuse_what_does_not_fit(
+    specimen: &Specimen,
+    case: Option<&Case>,
+    params: &SolveParams,
+) -> Result<()> {
+    let Some(free) = host::available_mib() else {
+        return Ok(());
+    };
+    let at_most = match case {
+        Some(case) => {
+            let cells = specimen.tv_mm3 / (case.structure.cell_volume() * case.lp_mm.powi(3));
+            cells * 4.0 * BYTES_PER_SITE
+        }
+        None => 4.0 * elements(specimen, params) * BYTES_PER_ELEMENT,
+    };
+    // Counting takes a while on large scans, so it is left out where there is no question.
+    if mib(at_most) < free {
+        return Ok(());
+    }
+    let needed = mib(need::of(specimen, case, params)?);
+    if needed < free {
+        return Ok(());
+    }
+    let factor = needed / free;
+    let advice = match case {
+        Some(case) => format!(
+            "crop the scan, or take a lattice parameter of {:.3} mm or more",
+            case.lp_mm * (1.1 * factor).cbrt()
+        ),
+        None if params.refine > 1 => format!("crop the scan, or --refine {}", params.refine - 1),
+        None => format!(
+            "crop the scan, or --coarsen {} (the modulus will be less exact), or use lattices",
+            (params.coarsen as f64 * (1.1 * factor).cbrt()).ceil()
+        ),
+    };
+    Err(Error::specimen(
+        format!("this solve needs about {needed:.0} MiB, {free:.0} MiB are free"),
+        advice,
+    ))
+}
+
+fn mib(bytes: f64) -> f64 {
+    bytes / (1024.0 * 1024.0)
 }
 
 fn bytes_on_disk(input: &Path) -> f64 {

@@ -1,4 +1,18 @@
-//! Owns what is asked of the machine: its name, the date, free memory.
+//! Owns what is asked of the machine: its name, the date, free memory, and that freed memory goes back to it.
+
+/// Blocks from this size on go back to the system when they are freed. The C library's own limit grows to 32 MiB with
+/// what a program frees, and vectors below it, freed between others, raised peaks by a third.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const LARGE_BYTES: i32 = 1 << 20;
+
+/// To be called once, before anything is allocated.
+pub fn give_freed_memory_back() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: sets a number of the allocator; no thread has been started yet.
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE_BYTES);
+    }
+}
 
 /// Name of this machine, or "unknown".
 pub fn name() -> String {

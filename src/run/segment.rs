@@ -1,11 +1,12 @@
 //! Owns `segment` on disk: a scan in, `mask.nii.gz`, `segment.json` and `segment.png` out, and reading them back.
 
 use crate::error::Result;
+use crate::io::scan::Scan;
 use crate::io::specimen::{self, Input, SegmentRecord};
 use crate::io::{atomic, picture, scan};
 use crate::measure::spheres::Spread;
 use crate::run::session::Session;
-use crate::stage::segment::{self as stage, SegmentParams, Voi};
+use crate::stage::segment::{self as stage, SegmentParams, Segmented, Voi};
 use crate::volume::{Specimen, Volume};
 use std::path::Path;
 
@@ -31,21 +32,7 @@ pub fn segment(
         session.say(format!("{}: up to date", dir.display()));
         return Ok(kept);
     }
-    let mut scan = scan::read_in(input, params.spacing_mm, params.units)?;
-    if let Some(name) = name {
-        scan.name = name.to_owned();
-    }
-    scan.notes
-        .iter()
-        .for_each(|note| session.say(format!("{}: {note}", scan.name)));
-    let voi_mask = match &params.voi {
-        Voi::Mask(path) => Some(specimen::read_mask(
-            path,
-            Some(scan.volume.grid.spacing_mm),
-        )?),
-        _ => None,
-    };
-    let segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
+    let (scan, segmented) = in_memory(input, name, params, session)?;
     let record = SegmentRecord {
         program: env!("CARGO_PKG_NAME").into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -66,6 +53,34 @@ pub fn segment(
         write(dir, &record, &scan.volume, &segmented.specimen)?;
     }
     Ok(record)
+}
+
+/// Reads and segments; nothing is written.
+///
+/// # Errors
+/// As [`segment`].
+pub fn in_memory(
+    input: &Path,
+    name: Option<&str>,
+    params: &SegmentParams,
+    session: &Session,
+) -> Result<(Scan, Segmented)> {
+    let mut scan = scan::read_in(input, params.spacing_mm, params.units)?;
+    if let Some(name) = name {
+        scan.name = name.to_owned();
+    }
+    scan.notes
+        .iter()
+        .for_each(|note| session.say(format!("{}: {note}", scan.name)));
+    let voi_mask = match &params.voi {
+        Voi::Mask(path) => Some(specimen::read_mask(
+            path,
+            Some(scan.volume.grid.spacing_mm),
+        )?),
+        _ => None,
+    };
+    let segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
+    Ok((scan, segmented))
 }
 
 /// The specimen that `segment` left in `dir`.

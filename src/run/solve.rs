@@ -10,7 +10,7 @@ use crate::run::meter::Meter;
 use crate::run::results::Results;
 use crate::run::segment::load;
 use crate::run::session::Session;
-use crate::run::stiffness;
+use crate::run::{estimate, stiffness};
 use crate::solve::cg::CgStep;
 use crate::stage::lattice::{Case, LatticeParams};
 use crate::stage::solve::fields::Recorded;
@@ -68,7 +68,10 @@ pub fn solve(
                 ));
                 continue;
             }
-            None => solve_job(dir, &specimen, &job, &blank, params, session)?,
+            None => {
+                estimate::refuse_what_does_not_fit(&specimen, job.case(), params)?;
+                solve_job(dir, &specimen, &job, &blank, params, session)?
+            }
         };
         session.say(in_words(&row));
         results.keep(&blank, params, &row)?;
@@ -130,6 +133,13 @@ impl Job {
         match self {
             Job::Lattice(case) => lattice::label(row, case),
             Job::VoxelFe => voxel_fe::label(row, specimen, params),
+        }
+    }
+
+    fn case(&self) -> Option<&Case> {
+        match self {
+            Job::Lattice(case) => Some(case),
+            Job::VoxelFe => None,
         }
     }
 

@@ -113,6 +113,12 @@ impl EnergyTail {
         Some((most * self.estimate?).sqrt())
     }
 
+    /// The larger of the relative errors of the energy and of the functional, should there be one of that value.
+    pub fn with_goal(&self, of_energy: Option<f64>, goal_value: Option<f64>) -> Option<f64> {
+        let of_goal = goal_value.and_then(|value| Some(self.goal_estimate()? / value.abs()));
+        of_energy.map(|e| of_goal.map_or(e, |g| e.max(g)))
+    }
+
     /// By bisection, a thousandth exact, from a bound above it.
     fn smallest_eigenvalue(&self, above: f64) -> f64 {
         let (mut low, mut high) = (0.5 * above, above);

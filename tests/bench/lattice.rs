@@ -7,7 +7,7 @@ mod specimen;
 
 use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::held::Held;
-use bonepd_ct::operator::{Operator, Preconditioner};
+use bonepd_ct::operator::{MixedPrecision, Operator, SinglePreconditioner};
 use bonepd_ct::physics::lattice::multigrid::Springs;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
 use bonepd_ct::recipe::Recipe;
@@ -72,6 +72,11 @@ fn benches(c: &mut Criterion, name: &str, bone: &Specimen) {
     group.bench_function("operator, nu 0.3", |b| {
         b.iter(|| third.apply(black_box(&x), &mut y))
     });
+    let x32 = vec![[0.5f32; 3]; sites.len()];
+    let (mut y32, mut spare) = (x32.clone(), x32.clone());
+    group.bench_function("operator, nu 0.3, single precision", |b| {
+        b.iter(|| third.apply_single(black_box(&x32), &mut y32, |_, _| 0.0))
+    });
     let springs = Springs::new(&third);
     let params = AmgParams::lattice(LP_MM);
     group.bench_function("multigrid set-up", |b| {
@@ -79,7 +84,7 @@ fn benches(c: &mut Criterion, name: &str, bone: &Specimen) {
     });
     let amg = Amg::new(&springs, &held, &params);
     group.bench_function("multigrid cycle", |b| {
-        b.iter(|| amg.apply(black_box(&x), &mut y))
+        b.iter(|| amg.apply_single(black_box(&x32), &mut y32, &mut spare))
     });
     drop(amg);
     group.bench_function("solve to 0.1 %", |b| {

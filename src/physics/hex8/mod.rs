@@ -208,6 +208,20 @@ mod tests {
         assert!(worst(&exact, &y) < 1e-13 * scale);
     }
 
+    /// Rounded coefficients do not sum to zero; differences of what is equal do.
+    #[test]
+    fn a_translation_pulls_at_nothing_in_single_precision() {
+        let x = |n: usize| vec![[1.1f32, -0.7, 123.4]; n];
+        let op = random([11, 7, 6], 45, 1);
+        let mut y = x(op.sites());
+        op.rows_f32(0..y.len(), &x(op.sites()), &mut y);
+        assert!(y.iter().flatten().all(|f| *f == 0.0));
+        let op = graded([11, 7, 6], 2);
+        let mut y = x(op.sites());
+        op.rows_f32(0..y.len(), &x(op.sites()), &mut y);
+        assert!(y.iter().flatten().all(|f| *f == 0.0));
+    }
+
     #[test]
     fn rows_are_what_the_operator_applies() {
         let op = random([9, 6, 5], 50, 3);

@@ -1,6 +1,6 @@
 //! Owns the lattice's inner loops: what one site gathers from its neighbours.
 
-use super::quad::Quad;
+use super::quad::{Precision, Quad};
 use crate::topology::neighbours::{DECODED, MOST, Neighbours, Table};
 use std::ops::Range;
 
@@ -161,16 +161,18 @@ pub unsafe fn volumetric_sums<Q: Quad>(
 /// # Safety
 /// As [`springs`]; `t` has an entry a site.
 #[inline(always)]
-pub unsafe fn volumetric_forces<Q: Quad<S = f64>>(
-    bonds: Bonds<f64>,
+pub unsafe fn volumetric_forces<Q: Quad>(
+    bonds: Bonds<Q::S>,
     sites: Range<usize>,
-    t: &[[f64; 2]],
-    y: &mut [[f64; 3]],
-) {
-    let term = |here: f64, site: usize, j: u32, shell: usize| {
+    t: &[[Q::S; 2]],
+    y: &mut [[Q::S; 3]],
+) where
+    Q::S: Precision,
+{
+    let term = |here: Q::S, site: usize, j: u32, shell: usize| {
         let there = unsafe { t.get_unchecked(j as usize)[shell] };
         // Selected, not branched on: which neighbours exist follows no pattern.
-        std::hint::select_unpredictable(j as usize == site, 0.0, here + there)
+        std::hint::select_unpredictable(j as usize == site, Q::S::default(), here + there)
     };
     each_site(&bonds, sites, |site, place, row| unsafe {
         let here = t[site];

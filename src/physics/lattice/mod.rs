@@ -14,15 +14,16 @@ pub mod multigrid;
 pub mod pieces;
 mod quad;
 
-use crate::operator::Operator;
+use crate::operator::{MixedPrecision, Operator};
 use crate::par::sum_chunks;
 use crate::simd::{Isa, isa};
 use crate::topology::sites::Sites;
 use kernel::Bonds;
 pub use moduli::{Moduli, check_solid};
+use quad::{Precision, Quad};
 use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard};
 
 /// One opposite pair of bonds: its direction in grid steps and the moduli scaled for it.
 #[derive(Debug, Clone, Copy)]
@@ -43,14 +44,21 @@ fn range(c: usize, len: usize) -> Range<usize> {
     c * PORTION..c * PORTION + len
 }
 
+/// Lattices whose sites contribute to a stress.
+pub trait Virial: Sync {
+    /// `V_i σ_aa,i` in N mm along the load axis: the derivative of the site's energy by a strain along it. Of a bond, only
+    /// the part between the innermost gripped planes counts.
+    fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> f64;
+}
+
 /// The linearised lattice as an operator: `K u` is the gradient of the energy. N and mm.
 pub struct Lattice<'a> {
     sites: &'a Sites,
     moduli: Moduli,
     pairs: Vec<Pair>,
-    scaled: Vec<kernel::Pair<f64>>,
-    /// `w_i T θ_{s,i}` of the last application; empty at ν = ¼, where no volumetric pass is made.
-    volumetric: Mutex<Vec<[f64; 2]>>,
+    double: Scaled<f64>,
+    single: Scaled<f32>,
+    room: Mutex<Vec<[f64; 2]>>,
 }
 
 impl<'a> Lattice<'a> {
@@ -69,14 +77,19 @@ impl<'a> Lattice<'a> {
         };
         let pairs: Vec<Pair> = stencil.pairs.iter().enumerate().map(pair).collect();
         let graded = sites.weights.is_some();
-        let scaled = pairs.iter().map(|p| p.scaled(graded)).collect();
-        let scratch = if moduli.t == 0.0 { 0 } else { sites.len() };
+        let double = Scaled {
+            pairs: pairs.iter().map(|p| p.scaled(graded)).collect(),
+            weights: sites.weights.clone(),
+            volumetric: moduli.t,
+        };
+        let room = if moduli.t == 0.0 { 0 } else { sites.len() };
         Lattice {
             sites,
             moduli,
             pairs,
-            scaled,
-            volumetric: Mutex::new(vec![[0.0; 2]; scratch]),
+            single: double.to_single(),
+            double,
+            room: Mutex::new(vec![[0.0; 2]; room]),
         }
     }
 
@@ -92,7 +105,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// Volumetric sums `θ_s = Σ_{j∈s} dl_ij` of one site.
-    fn volumetric_sums(&self, u: &[[f64; 3]], site: usize) -> [f64; 2] {
+    fn volumetric_sums<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> [f64; 2] {
         let mut theta = [0.0; 2];
         for (pair, plus, minus) in self.bonded(site) {
             theta[pair.shell] += pair.half * along(pair.d, u[plus], u[minus]);
@@ -119,10 +132,10 @@ impl<'a> Lattice<'a> {
         let [a, b] = self.volumetric_sums(u, site);
         self.weight(site) * 0.5 * (springs + self.moduli.t * (a * a + b * b))
     }
+}
 
-    /// `V_i σ_aa,i` in N mm along the load axis: the derivative of the site's energy by a strain along it. Of a bond,
-    /// only the part between the innermost gripped planes counts.
-    pub fn site_virial(&self, u: &[[f64; 3]], site: usize) -> f64 {
+impl Virial for Lattice<'_> {
+    fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> f64 {
         let (axis, grips) = (self.sites.frame.axis.index(), self.sites.grips);
         let theta = if self.moduli.t == 0.0 {
             [0.0; 2]
@@ -174,61 +187,134 @@ impl Pair {
     }
 }
 
+/// What the kernels need of a lattice, by precision.
+#[derive(Debug)]
+struct Scaled<S> {
+    pairs: Vec<kernel::Pair<S>>,
+    weights: Option<Vec<S>>,
+    /// `T`.
+    volumetric: S,
+}
+
+impl Scaled<f64> {
+    fn to_single(&self) -> Scaled<f32> {
+        let single = |v: [f64; 4]| v.map(|x| x as f32);
+        let pair = |p: &kernel::Pair<f64>| kernel::Pair {
+            shell: p.shell,
+            diagonals: p.diagonals.map(single),
+            axial: p.axial,
+            lever: single(p.lever),
+        };
+        let weights = self.weights.as_ref();
+        Scaled {
+            pairs: self.pairs.iter().map(pair).collect(),
+            weights: weights.map(|w| w.iter().map(|&w| w as f32).collect()),
+            volumetric: self.volumetric as f32,
+        }
+    }
+}
+
 /// The kernels on this processor.
-impl Lattice<'_> {
-    fn bonds(&self) -> Bonds<'_, f64> {
+impl<S: Precision> Scaled<S> {
+    fn bonds<'a>(&'a self, sites: &'a Sites) -> Bonds<'a, S> {
         Bonds {
-            pairs: &self.scaled,
-            neighbours: &self.sites.neighbours,
+            pairs: &self.pairs,
+            neighbours: &sites.neighbours,
         }
     }
 
-    /// The springs' part of `K u` at `sites`.
-    fn springs(&self, sites: Range<usize>, u: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        assert_eq!(u.len(), self.sites.len());
-        let weights = self.sites.weights.as_deref();
+    /// The springs' part of `K u` at `range`.
+    fn springs(&self, sites: &Sites, range: Range<usize>, u: &[[S; 3]], y: &mut [[S; 3]]) {
+        assert!(u.len() == sites.len() && y.len() == range.len());
+        let (bonds, weights) = (self.bonds(sites), self.weights.as_deref());
         // SAFETY: `isa` vouches for the instruction set, `Sites` for neighbours below its length.
         unsafe {
             match isa() {
                 #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => avx2::springs(self.bonds(), weights, sites, u, y),
-                _ => springs::<quad::Plain64>(self.bonds(), weights, sites, u, y),
+                Isa::Avx2 | Isa::Avx512 => avx2::springs::<S::Fast>(bonds, weights, range, u, y),
+                _ => springs::<S::Plain>(bonds, weights, range, u, y),
             }
         }
     }
 
-    /// The springs' part of `K u` and the volumetric sums at `sites`.
-    fn springs_and_sums(
+    /// The springs' part of `K u` and `w_i T θ_{s,i}` at `range`.
+    fn springs_and_pressures(
         &self,
-        sites: Range<usize>,
-        u: &[[f64; 3]],
-        y: &mut [[f64; 3]],
-        theta: &mut [[f64; 2]],
+        sites: &Sites,
+        range: Range<usize>,
+        u: &[[S; 3]],
+        y: &mut [[S; 3]],
+        t: &mut [[S; 2]],
     ) {
-        assert_eq!(u.len(), self.sites.len());
-        let weights = self.sites.weights.as_deref();
+        assert!(u.len() == sites.len() && y.len() == range.len() && t.len() == range.len());
+        let (bonds, weights, own) = (self.bonds(sites), self.weights.as_deref(), range.clone());
         // SAFETY: as `springs`.
         unsafe {
             match isa() {
                 #[cfg(target_arch = "x86_64")]
                 Isa::Avx2 | Isa::Avx512 => {
-                    avx2::springs_and_sums(self.bonds(), weights, sites, u, y, theta);
+                    avx2::springs_and_sums::<S::Fast>(bonds, weights, own, u, y, t);
                 }
-                _ => springs_and_sums::<quad::Plain64>(self.bonds(), weights, sites, u, y, theta),
+                _ => springs_and_sums::<S::Plain>(bonds, weights, own, u, y, t),
             }
+        }
+        for (site, t) in range.zip(t) {
+            let factor = match weights {
+                Some(weights) => weights[site] * self.volumetric,
+                None => self.volumetric,
+            };
+            *t = t.map(|sum| factor * sum);
         }
     }
 
-    fn add_volumetric_forces(&self, sites: Range<usize>, t: &[[f64; 2]], y: &mut [[f64; 3]]) {
-        assert_eq!(t.len(), self.sites.len());
+    /// Adds what the volumetric term pulls by, from every site's `w T θ`.
+    fn add_volumetric_forces(
+        &self,
+        sites: &Sites,
+        range: Range<usize>,
+        t: &[[S; 2]],
+        y: &mut [[S; 3]],
+    ) {
+        assert!(t.len() == sites.len() && y.len() == range.len());
+        let bonds = self.bonds(sites);
         // SAFETY: as `springs`.
         unsafe {
             match isa() {
                 #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => avx2::volumetric_forces(self.bonds(), sites, t, y),
-                _ => kernel::volumetric_forces::<quad::Plain64>(self.bonds(), sites, t, y),
+                Isa::Avx2 | Isa::Avx512 => {
+                    avx2::volumetric_forces::<S::Fast>(bonds, range, t, y);
+                }
+                _ => kernel::volumetric_forces::<S::Plain>(bonds, range, t, y),
             }
         }
+    }
+
+    /// `y = K u`, part by part; `t` is room for every site's `w T θ`. Each part, with its first site, is given to
+    /// `finish`, whose values are added up in order.
+    fn apply(
+        &self,
+        sites: &Sites,
+        u: &[[S; 3]],
+        y: &mut [[S; 3]],
+        t: &mut [[S; 2]],
+        finish: impl Fn(usize, &mut [[S; 3]]) -> f64 + Sync,
+    ) -> f64 {
+        if !t.is_empty() {
+            let parts = t.par_chunks_mut(PORTION).zip(y.par_chunks_mut(PORTION));
+            parts.enumerate().for_each(|(c, (t, y))| {
+                self.springs_and_pressures(sites, range(c, t.len()), u, y, t);
+            });
+        }
+        let t = &*t;
+        let parts = y.par_chunks_mut(PORTION).enumerate().map(|(c, y)| {
+            let own = range(c, y.len());
+            match t.is_empty() {
+                true => self.springs(sites, own, u, y),
+                false => self.add_volumetric_forces(sites, own, t, y),
+            }
+            finish(c * PORTION, y)
+        });
+        parts.collect::<Vec<f64>>().iter().sum()
     }
 }
 
@@ -237,7 +323,7 @@ impl Lattice<'_> {
 /// # Safety
 /// As [`kernel::springs`].
 #[inline(always)]
-unsafe fn springs<Q: quad::Quad>(
+unsafe fn springs<Q: Quad>(
     bonds: Bonds<Q::S>,
     weights: Option<&[Q::S]>,
     sites: Range<usize>,
@@ -257,7 +343,7 @@ unsafe fn springs<Q: quad::Quad>(
 /// # Safety
 /// As [`kernel::springs`].
 #[inline(always)]
-unsafe fn springs_and_sums<Q: quad::Quad>(
+unsafe fn springs_and_sums<Q: Quad>(
     bonds: Bonds<Q::S>,
     weights: Option<&[Q::S]>,
     sites: Range<usize>,
@@ -280,57 +366,48 @@ unsafe fn springs_and_sums<Q: quad::Quad>(
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     use super::kernel::{self, Bonds};
-    use super::quad::{Avx32, Avx64};
+    use super::quad::{Precision, Quad};
     use std::ops::Range;
 
     #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn springs(
-        bonds: Bonds<f64>,
-        weights: Option<&[f64]>,
+    pub unsafe fn springs<Q: Quad>(
+        bonds: Bonds<Q::S>,
+        weights: Option<&[Q::S]>,
         sites: Range<usize>,
-        u: &[[f64; 3]],
-        y: &mut [[f64; 3]],
+        u: &[[Q::S; 3]],
+        y: &mut [[Q::S; 3]],
     ) {
-        unsafe { super::springs::<Avx64>(bonds, weights, sites, u, y) }
+        unsafe { super::springs::<Q>(bonds, weights, sites, u, y) }
     }
 
     #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn springs_f32(
-        bonds: Bonds<f32>,
-        weights: Option<&[f32]>,
+    pub unsafe fn springs_and_sums<Q: Quad>(
+        bonds: Bonds<Q::S>,
+        weights: Option<&[Q::S]>,
         sites: Range<usize>,
-        u: &[[f32; 3]],
-        y: &mut [[f32; 3]],
+        u: &[[Q::S; 3]],
+        y: &mut [[Q::S; 3]],
+        theta: &mut [[Q::S; 2]],
     ) {
-        unsafe { super::springs::<Avx32>(bonds, weights, sites, u, y) }
+        unsafe { super::springs_and_sums::<Q>(bonds, weights, sites, u, y, theta) }
     }
 
     #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn springs_and_sums(
-        bonds: Bonds<f64>,
-        weights: Option<&[f64]>,
+    pub unsafe fn volumetric_forces<Q: Quad>(
+        bonds: Bonds<Q::S>,
         sites: Range<usize>,
-        u: &[[f64; 3]],
-        y: &mut [[f64; 3]],
-        theta: &mut [[f64; 2]],
-    ) {
-        unsafe { super::springs_and_sums::<Avx64>(bonds, weights, sites, u, y, theta) }
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn volumetric_forces(
-        bonds: Bonds<f64>,
-        sites: Range<usize>,
-        t: &[[f64; 2]],
-        y: &mut [[f64; 3]],
-    ) {
-        unsafe { kernel::volumetric_forces::<Avx64>(bonds, sites, t, y) }
+        t: &[[Q::S; 2]],
+        y: &mut [[Q::S; 3]],
+    ) where
+        Q::S: Precision,
+    {
+        unsafe { kernel::volumetric_forces::<Q>(bonds, sites, t, y) }
     }
 }
 
 /// `d · (a − b)`.
-fn along(d: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
-    d[0] * (a[0] - b[0]) + d[1] * (a[1] - b[1]) + d[2] * (a[2] - b[2])
+fn along<S: Copy + Into<f64>>(d: [f64; 3], a: [S; 3], b: [S; 3]) -> f64 {
+    (0..3).map(|c| d[c] * (a[c].into() - b[c].into())).sum()
 }
 
 impl Operator<3> for Lattice<'_> {
@@ -339,30 +416,8 @@ impl Operator<3> for Lattice<'_> {
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        let t = self.moduli.t;
-        if t == 0.0 {
-            let springs = |(c, y): (usize, &mut [[f64; 3]])| self.springs(range(c, y.len()), x, y);
-            y.par_chunks_mut(PORTION).enumerate().for_each(springs);
-            return;
-        }
-        let mut scratch = self
-            .volumetric
-            .lock()
-            .expect("no application panics while it holds the scratch");
-        let chunks = scratch
-            .par_chunks_mut(PORTION)
-            .zip(y.par_chunks_mut(PORTION));
-        chunks.enumerate().for_each(|(c, (theta, y))| {
-            let sites = range(c, theta.len());
-            self.springs_and_sums(sites.clone(), x, y, theta);
-            for (site, theta) in sites.zip(theta) {
-                *theta = theta.map(|sum| self.weight(site) * t * sum);
-            }
-        });
-        let scratch = &*scratch;
-        y.par_chunks_mut(PORTION).enumerate().for_each(|(c, y)| {
-            self.add_volumetric_forces(range(c, y.len()), scratch, y);
-        });
+        let mut room = self.room();
+        self.double.apply(self.sites, x, y, &mut room, |_, _| 0.0);
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
@@ -372,7 +427,55 @@ impl Operator<3> for Lattice<'_> {
     }
 }
 
+impl MixedPrecision for Lattice<'_> {
+    fn apply_single(
+        &self,
+        x: &[[f32; 3]],
+        y: &mut [[f32; 3]],
+        finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
+    ) -> f64 {
+        let mut room = self.room();
+        let sites = room.len();
+        let room = &mut bytemuck::cast_slice_mut(&mut room)[..sites];
+        self.single.apply(self.sites, x, y, room, finish)
+    }
+
+    fn each_part(
+        &self,
+        x: &[[f64; 3]],
+        out: &mut [[f32; 3]],
+        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        let (sites, double) = (self.sites, &self.double);
+        let mut t = self.room();
+        t.par_chunks_mut(PORTION).enumerate().for_each(|(c, t)| {
+            let mut springs = [[0.0; 3]; PORTION];
+            let springs = &mut springs[..t.len()];
+            double.springs_and_pressures(sites, range(c, t.len()), x, springs, t);
+        });
+        let part = |(c, out): (usize, &mut [[f32; 3]])| {
+            let mut image = [[0.0; 3]; PORTION];
+            let image = &mut image[..out.len()];
+            let own = range(c, out.len());
+            double.springs(sites, own.clone(), x, image);
+            if !t.is_empty() {
+                double.add_volumetric_forces(sites, own, &t, image);
+            }
+            take(c * PORTION, image, out)
+        };
+        let parts: Vec<[f64; 2]> = out.par_chunks_mut(PORTION).enumerate().map(part).collect();
+        [0, 1].map(|k| parts.iter().map(|p| p[k]).sum())
+    }
+}
+
 impl Lattice<'_> {
+    /// Room for every site's `w T θ`; empty at ν = ¼, where no volumetric pass is made.
+    fn room(&self) -> MutexGuard<'_, Vec<[f64; 2]>> {
+        self.room
+            .lock()
+            .expect("no application panics while it holds the room")
+    }
+
     fn site_diagonal(&self, site: usize) -> [f64; 3] {
         let (t, w) = (self.moduli.t, self.weight(site));
         let (mut d, mut gradient) = ([0.0; 3], [[0.0; 3]; 2]);

@@ -3,11 +3,9 @@
 //! The volumetric term reaches two bonds far and is small beside the springs unless tissue is nearly incompressible, so
 //! the preconditioner is built on the springs alone; conjugate gradients sees the whole lattice.
 
-use super::kernel::{self, Bonds};
-use super::{Lattice, PORTION, quad, range, springs};
+use super::{Lattice, PORTION, range};
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
-use crate::simd::{Isa, isa};
 use crate::topology::neighbours::{DECODED, MOST};
 use crate::topology::sites::Sites;
 use rayon::prelude::*;
@@ -16,8 +14,6 @@ use std::ops::Range;
 /// The springs of a lattice as an operator of their own.
 pub struct Springs<'a> {
     lattice: &'a Lattice<'a>,
-    pairs: Vec<kernel::Pair<f32>>,
-    weights: Option<Vec<f32>>,
     /// By pair: `½ k n nᵀ` of a bond between sites of weight 1.
     stiffness: Vec<[[f64; 3]; 3]>,
     /// Its negative, what such a bond couples its ends by.
@@ -26,16 +22,6 @@ pub struct Springs<'a> {
 
 impl<'a> Springs<'a> {
     pub fn new(lattice: &'a Lattice<'a>) -> Self {
-        let single = |v: [f64; 4]| v.map(|x| x as f32);
-        let pair = |p: &kernel::Pair<f64>| kernel::Pair {
-            shell: p.shell,
-            diagonals: p.diagonals.map(single),
-            axial: p.axial,
-            lever: single(p.lever),
-        };
-        let pairs = lattice.scaled.iter().map(pair).collect();
-        let weights = lattice.sites.weights.as_ref();
-        let weights = weights.map(|w| w.iter().map(|&w| w as f32).collect());
         let stiffness = |p: &super::Pair| p.d.map(|a| p.d.map(|b| p.spring * a * b));
         let stiffness: Vec<_> = lattice.pairs.iter().map(stiffness).collect();
         let negative = |k: &[[f64; 3]; 3]| k.map(|row| row.map(|v| -v as f32));
@@ -43,8 +29,6 @@ impl<'a> Springs<'a> {
             coupling: stiffness.iter().map(negative).collect(),
             stiffness,
             lattice,
-            pairs,
-            weights,
         }
     }
 
@@ -101,7 +85,7 @@ impl Coarsen for Springs<'_> {
     }
 
     fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
-        let uniform = self.weights.is_none();
+        let uniform = self.lattice.sites.weights.is_none();
         let (mut columns, mut blocks) = ([0; MOST + 1], [[[0.0; 3]; 3]; MOST + 1]);
         self.each_ends(sites, |site, ends| {
             let (mut own, mut n) = ([[0.0; 3]; 3], 0);
@@ -139,24 +123,11 @@ impl Coarsen for Springs<'_> {
     }
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        self.lattice.springs(sites, x, y);
+        self.lattice.double.springs(self.lattice.sites, sites, x, y);
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
-        assert_eq!(x.len(), self.sites());
-        let bonds = Bonds {
-            pairs: &self.pairs,
-            neighbours: &self.lattice.sites.neighbours,
-        };
-        let weights = self.weights.as_deref();
-        // SAFETY: `isa` vouches for the instruction set, `Sites` for neighbours below its length.
-        unsafe {
-            match isa() {
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => super::avx2::springs_f32(bonds, weights, sites, x, y),
-                _ => springs::<quad::Plain32>(bonds, weights, sites, x, y),
-            }
-        }
+        self.lattice.single.springs(self.lattice.sites, sites, x, y);
     }
 
     /// Of one spring, `(u_i − u_j)² <= 2 u_i² + 2 u_j²`.

@@ -4,9 +4,9 @@
 //! of a whole site in shell `s`. Where all shares are 1 this is the uniform lattice, and by Cauchy and Schwarz it is never
 //! negative where the uniform one is not (`k_s + N_s T >= 0`), whatever the shares.
 
-use super::Moduli;
-use crate::operator::Operator;
+use super::{Moduli, Virial};
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
+use crate::operator::{MixedPrecision, Operator};
 use crate::topology::pieces::Pieces;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -76,20 +76,20 @@ impl<'a> GradedLattice<'a> {
 
     /// Elongations of a site's bonds: end, direction, share, `dl`.
     #[inline]
-    fn stretched<'b>(
+    fn stretched<'b, S: Copy + Into<f64>>(
         &'b self,
-        u: &'b [[f64; 3]],
+        u: &'b [[S; 3]],
         site: usize,
     ) -> impl Iterator<Item = (usize, &'b Direction, f64, f64)> + 'b {
         self.pieces.bonds.of(site).map(move |(end, b, share)| {
             let d = &self.directions[b];
-            let along: f64 = (0..3).map(|c| d.d[c] * (u[end][c] - u[site][c])).sum();
+            let along = super::along(d.d, u[end], u[site]);
             (end, d, f64::from(share), d.half * along)
         })
     }
 
     /// `T N_s / Σ σ · Σ σ dl` of both shells.
-    fn pressures(&self, u: &[[f64; 3]], site: usize) -> [f64; 2] {
+    fn pressures<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (_, d, share, dl) in self.stretched(u, site) {
             sums[d.shell] += share * dl;
@@ -116,9 +116,37 @@ impl<'a> GradedLattice<'a> {
         })
     }
 
-    /// `V σ` of one site along the load axis in N mm: the derivative of its energy by a strain along it. Of a bond, only
-    /// the part between the innermost gripped planes counts.
-    pub fn site_virial(&self, u: &[[f64; 3]], site: usize) -> f64 {
+    /// Of every site, what a volumetric pass gives; none at ν = ¼.
+    fn all_pressures<S: Copy + Into<f64> + Sync>(&self, u: &[[S; 3]]) -> Vec<[f64; 2]> {
+        assert_eq!(u.len(), self.pieces.len());
+        (0..self.volumetric.len())
+            .into_par_iter()
+            .with_min_len(PORTION)
+            .map(|site| self.pressures(u, site))
+            .collect()
+    }
+
+    /// A site's row of `K u`.
+    fn row<S: Copy + Into<f64>>(
+        &self,
+        u: &[[S; 3]],
+        pressures: &[[f64; 2]],
+        site: usize,
+    ) -> [f64; 3] {
+        let mut f = [0.0; 3];
+        for (end, d, share, dl) in self.stretched(u, site) {
+            let mut pull = 2.0 * self.moduli.k[d.shell] * dl;
+            if let (Some(here), Some(there)) = (pressures.get(site), pressures.get(end)) {
+                pull += here[d.shell] + there[d.shell];
+            }
+            (0..3).for_each(|c| f[c] -= share * pull * d.half * d.d[c]);
+        }
+        f
+    }
+}
+
+impl Virial for GradedLattice<'_> {
+    fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> f64 {
         let (axis, grips) = (self.pieces.frame.axis.index(), self.pieces.grips);
         let plane = self.pieces.indices[site][axis];
         let pressures = if self.volumetric.is_empty() {
@@ -146,27 +174,11 @@ impl Operator<3> for GradedLattice<'_> {
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        assert_eq!(x.len(), self.sites());
-        let pressures: Vec<[f64; 2]> = (0..self.volumetric.len())
-            .into_par_iter()
-            .with_min_len(PORTION)
-            .map(|site| self.pressures(x, site))
-            .collect();
-        let row = |site: usize| {
-            let mut f = [0.0; 3];
-            for (end, d, share, dl) in self.stretched(x, site) {
-                let mut pull = 2.0 * self.moduli.k[d.shell] * dl;
-                if let (Some(here), Some(there)) = (pressures.get(site), pressures.get(end)) {
-                    pull += here[d.shell] + there[d.shell];
-                }
-                (0..3).for_each(|c| f[c] -= share * pull * d.half * d.d[c]);
-            }
-            f
-        };
+        let pressures = self.all_pressures(x);
         y.par_iter_mut()
             .with_min_len(PORTION)
             .enumerate()
-            .for_each(|(site, y)| *y = row(site));
+            .for_each(|(site, y)| *y = self.row(x, &pressures, site));
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
@@ -187,6 +199,41 @@ impl Operator<3> for GradedLattice<'_> {
             }
             *d = own;
         });
+    }
+}
+
+impl MixedPrecision for GradedLattice<'_> {
+    fn apply_single(
+        &self,
+        x: &[[f32; 3]],
+        y: &mut [[f32; 3]],
+        finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
+    ) -> f64 {
+        let pressures = self.all_pressures(x);
+        let part = |(c, y): (usize, &mut [[f32; 3]])| {
+            for (site, y) in (c * PORTION..).zip(y.iter_mut()) {
+                *y = self.row(x, &pressures, site).map(|f| f as f32);
+            }
+            finish(c * PORTION, y)
+        };
+        let parts: Vec<f64> = y.par_chunks_mut(PORTION).enumerate().map(part).collect();
+        parts.iter().sum()
+    }
+
+    fn each_part(
+        &self,
+        x: &[[f64; 3]],
+        out: &mut [[f32; 3]],
+        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        let pressures = self.all_pressures(x);
+        let part = |(c, out): (usize, &mut [[f32; 3]])| {
+            let sites = c * PORTION..c * PORTION + out.len();
+            let image: Vec<[f64; 3]> = sites.map(|s| self.row(x, &pressures, s)).collect();
+            take(c * PORTION, &image, out)
+        };
+        let parts: Vec<[f64; 2]> = out.par_chunks_mut(PORTION).enumerate().map(part).collect();
+        [0, 1].map(|k| parts.iter().map(|p| p[k]).sum())
     }
 }
 

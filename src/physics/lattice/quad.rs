@@ -1,6 +1,8 @@
 //! Owns four-lane arithmetic for one site's vector (x, y, z and an idle lane), chosen at run time: AVX2 with fused
 //! multiply-add where the processor has it, plain arrays elsewhere.
 
+use std::ops::{Add, Mul, Sub};
+
 /// # Safety
 /// Methods may be called only where the implementation's instruction set is available; pointers must be valid for three
 /// scalars. The fourth lane is zero after `load`, and stays what arithmetic makes of zeros.
@@ -24,6 +26,38 @@ pub trait Quad: Copy {
     unsafe fn turn_back(self) -> Self;
     /// `x + y + z`.
     unsafe fn sum(self) -> Self::S;
+}
+
+/// A precision that the kernels come in.
+pub trait Precision:
+    Copy
+    + Default
+    + Send
+    + Sync
+    + Into<f64>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+{
+    /// With AVX2, where that can be had.
+    type Fast: Quad<S = Self>;
+    type Plain: Quad<S = Self>;
+}
+
+impl Precision for f64 {
+    #[cfg(target_arch = "x86_64")]
+    type Fast = Avx64;
+    #[cfg(not(target_arch = "x86_64"))]
+    type Fast = Plain64;
+    type Plain = Plain64;
+}
+
+impl Precision for f32 {
+    #[cfg(target_arch = "x86_64")]
+    type Fast = Avx32;
+    #[cfg(not(target_arch = "x86_64"))]
+    type Fast = Plain32;
+    type Plain = Plain32;
 }
 
 macro_rules! plain {
@@ -87,7 +121,7 @@ plain!(Plain64, f64);
 plain!(Plain32, f32);
 
 #[cfg(target_arch = "x86_64")]
-pub use avx2::{Avx32, Avx64};
+use avx2::{Avx32, Avx64};
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {

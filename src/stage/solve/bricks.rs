@@ -18,7 +18,7 @@ use std::ops::Range;
 pub const LOCKING_POISSON: f64 = 0.4;
 
 /// Bone fraction of a coarsened voxel below which it is no element.
-const LEAST_FRACTION: f32 = 0.02;
+pub(super) const LEAST_FRACTION: f32 = 0.02;
 
 /// Which elements carry load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

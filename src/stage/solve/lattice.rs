@@ -3,17 +3,17 @@
 use crate::error::{Error, Result};
 use crate::measure::apparent::Loaded;
 use crate::measure::row::Row;
-use crate::operator::Operator;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
+use crate::operator::{Functional, MixedPrecision, Operator};
 use crate::par::sum_chunks;
 use crate::physics::lattice::multigrid::Springs;
 use crate::physics::lattice::pieces::{GradedLattice, GradedSprings};
-use crate::physics::lattice::{self, Lattice};
+use crate::physics::lattice::{self, Lattice, Virial};
 use crate::physics::material::Solid;
 use crate::solve::amg::{Amg, AmgParams};
-use crate::solve::cg::{CgInfo, CgParams, CgStep, Goal};
-use crate::solve::fallback::towards_or_fall_back;
+use crate::solve::cg::{CgInfo, CgParams, CgStep};
+use crate::solve::fallback::minimise_or_fall_back;
 use crate::stage::lattice::{Boundary, Case, build_of, build_pieces};
 use crate::stage::solve::mechanisms::mechanisms;
 use crate::stage::solve::solved::{Moduli, Solved};
@@ -72,9 +72,12 @@ pub fn solve_lattice(
         };
         let model = GradedLattice::new(&pieces, moduli);
         let springs = GradedSprings(&model);
-        let virial = |u: &[[f64; 3]], s| model.site_virial(u, s);
+        let stress = Stress {
+            model: &model,
+            counts: None,
+        };
         return Ok(solve_model(
-            &model, &springs, &virial, &laid, specimen, case, params, observe,
+            &model, &springs, &stress, &laid, specimen, case, params, observe,
         ));
     }
     let sites = build_of(specimen, mixed, case, params.axis, params.grip_mm)?;
@@ -89,24 +92,20 @@ pub fn solve_lattice(
     };
     let model = Lattice::new(&sites, moduli);
     let springs = Springs::new(&model);
-    // Which sites count, once: the stress is asked for in every iteration.
-    let counts: Option<Vec<bool>> = (case.boundary == Boundary::Firm).then(|| {
-        let sites = &sites;
-        (0..sites.len())
-            .into_par_iter()
-            .map(|s| sites.fully_coordinated(s))
-            .collect()
+    let counts = (case.boundary == Boundary::Firm).then(|| {
+        let all = (0..sites.len()).into_par_iter();
+        all.map(|s| sites.fully_coordinated(s)).collect()
     });
-    let virial = |u: &[[f64; 3]], s| match counts.as_ref().is_none_or(|counts| counts[s]) {
-        true => model.site_virial(u, s),
-        false => 0.0,
+    let stress = Stress {
+        model: &model,
+        counts,
     };
     let mechanisms = match params.mechanisms {
         true => Some(count_mechanisms(&model, &laid, moduli, params)?),
         false => None,
     };
     let solved = solve_model(
-        &model, &springs, &virial, &laid, specimen, case, params, observe,
+        &model, &springs, &stress, &laid, specimen, case, params, observe,
     );
     Ok(Solved {
         mechanisms,
@@ -145,14 +144,38 @@ impl Laid<'_> {
     }
 }
 
-/// Contribution of one site to the stress that counts, in N mm.
-type Virial<'a> = dyn Fn(&[[f64; 3]], usize) -> f64 + Sync + 'a;
+/// The stress of a lattice times its volume, in N mm: a functional of the displacements.
+struct Stress<'a, M> {
+    model: &'a M,
+    /// Which sites count; all where there is none. Made once, as the stress is asked for in every iteration.
+    counts: Option<Vec<bool>>,
+}
+
+impl<M: Virial> Stress<'_, M> {
+    fn sum<S: Copy + Into<f64> + Sync>(&self, u: &[[S; 3]]) -> f64 {
+        let counts = |s: &usize| self.counts.as_ref().is_none_or(|counts| counts[*s]);
+        sum_chunks(u.len(), |sites| {
+            let sites = sites.filter(counts);
+            sites.map(|s| self.model.site_virial(u, s)).sum()
+        })
+    }
+}
+
+impl<M: Virial> Functional<3> for Stress<'_, M> {
+    fn of(&self, u: &[[f64; 3]]) -> f64 {
+        self.sum(u)
+    }
+
+    fn of_single(&self, u: &[[f32; 3]]) -> f64 {
+        self.sum(u)
+    }
+}
 
 #[allow(clippy::too_many_arguments)] // what a solve is made of, once
 fn solve_model(
-    model: &impl Operator<3>,
+    model: &impl MixedPrecision,
     springs: &impl Coarsen,
-    virial: &Virial,
+    stress: &impl Functional<3>,
     laid: &Laid,
     specimen: &Specimen,
     case: &Case,
@@ -170,14 +193,11 @@ fn solve_model(
         max_iterations: params.max_iterations,
         ..CgParams::default()
     };
-    let stress = |u: &[[f64; 3]]| sum_virial(virial, u);
     // Firm's headline is a linear functional, off to first order where the energy is off to second.
-    let goal: Option<Goal<3>> = match case.boundary {
-        Boundary::Firm => Some(&stress),
-        _ => None,
-    };
+    let goal = (case.boundary == Boundary::Firm).then_some(stress);
     let amg = Amg::new(springs, &held, &AmgParams::lattice(case.lp_mm));
-    let info = towards_or_fall_back(model, &held, &amg, &mut u, &cg, goal, observe);
+    let info = minimise_or_fall_back(model, &held, &amg, &mut u, &cg, goal, observe);
+    drop(amg);
     Solved {
         sites: laid.indices.len(),
         dropped: laid.dropped,
@@ -185,7 +205,7 @@ fn solve_model(
         iterations: info.iterations,
         residual: info.residual,
         ended: info.ended,
-        moduli: assess(model, virial, laid, &loaded, &u, &info),
+        moduli: assess(model, stress, laid, &loaded, &u, &info),
         mechanisms: None,
     }
 }
@@ -214,11 +234,6 @@ fn one_ratio(tissue: &Tissue) -> Result<(Solid, Option<&[f32]>)> {
     }
 }
 
-/// The virial of all sites that count, in N mm.
-fn sum_virial(virial: &Virial, u: &[[f64; 3]]) -> f64 {
-    sum_chunks(u.len(), |range| range.map(|s| virial(u, s)).sum())
-}
-
 /// Which unknowns are held, and a start that meets them: the field of a homogeneous bar.
 fn supports(laid: &Laid, params: &SolveParams, displacement_mm: f64) -> (Held, Vec<[f64; 3]>) {
     let axis = params.axis.index();
@@ -244,7 +259,7 @@ fn supports(laid: &Laid, params: &SolveParams, displacement_mm: f64) -> (Held, V
 
 fn assess(
     model: &impl Operator<3>,
-    virial: &Virial,
+    stress: &impl Functional<3>,
     laid: &Laid,
     loaded: &Loaded,
     u: &[[f64; 3]],
@@ -256,7 +271,7 @@ fn assess(
     let high = |s: &usize| laid.plane(*s) >= laid.grips.high;
     let reaction: f64 = (0..sites).filter(high).map(|s| force[s][axis]).sum();
     let from_energy_mpa = loaded.from_energy(info.energy);
-    let from_stress_mpa = loaded.from_virial(sum_virial(virial, u));
+    let from_stress_mpa = loaded.from_virial(stress.of(u));
     let relative = info.energy_error / info.energy;
     let (e_app_mpa, algebraic_error_mpa) = match info.goal_error {
         Some(error) => (from_stress_mpa, loaded.from_virial(error).abs()),

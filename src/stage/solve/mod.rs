@@ -4,6 +4,7 @@ pub mod bricks;
 pub mod fields;
 pub mod lattice;
 pub mod mechanisms;
+pub mod need;
 pub mod solved;
 pub mod stiffness;
 pub mod tissue;

@@ -6,8 +6,8 @@ use crate::operator::Operator;
 use crate::operator::held::Held;
 use crate::par::{CHUNK, dot, sum_chunks};
 use crate::solve::amg::{Amg, AmgParams};
-use crate::solve::cg::{CgParams, CgStep, Ended};
-use crate::solve::fallback::minimise_mixed_or_fall_back;
+use crate::solve::cg::{CgParams, CgStep, ENERGY_ALONE, Ended};
+use crate::solve::fallback::minimise_or_fall_back;
 use crate::stage::solve::bricks::{Bricks, Keep};
 use crate::stage::solve::{Conditions, SolveParams};
 use crate::topology::voxels::VoxelMesh;
@@ -93,10 +93,15 @@ pub fn solve_stiffness(
         sum.unknowns = sum.unknowns.max(held.free::<3>());
         for &load in loads {
             let mut u = affine(mesh, load);
-            let info =
-                minimise_mixed_or_fall_back(&model, &held, &preconditioner, &mut u, &cg, |step| {
-                    observe(load, step)
-                });
+            let info = minimise_or_fall_back(
+                &model,
+                &held,
+                &preconditioner,
+                &mut u,
+                &cg,
+                ENERGY_ALONE,
+                |step| observe(load, step),
+            );
             sum.iterations[load] = info.iterations;
             sum.residual = sum.residual.max(info.residual);
             if !info.ended.converged() {

@@ -7,8 +7,8 @@ use crate::operator::Operator;
 use crate::operator::held::Held;
 use crate::par::sum_chunks;
 use crate::solve::amg::{Amg, AmgParams};
-use crate::solve::cg::{CgInfo, CgParams, CgStep};
-use crate::solve::fallback::minimise_mixed_or_fall_back;
+use crate::solve::cg::{CgInfo, CgParams, CgStep, ENERGY_ALONE};
+use crate::solve::fallback::minimise_or_fall_back;
 use crate::stage::solve::bricks::{Bricks, Keep};
 use crate::stage::solve::fields::{self, Recorded};
 use crate::stage::solve::mechanisms::mechanisms;
@@ -67,7 +67,15 @@ pub fn solve_recorded(
         false => None,
     };
     let preconditioner = Amg::new(&model, &held, &AmgParams::new(mesh.grid.spacing_mm));
-    let info = minimise_mixed_or_fall_back(&model, &held, &preconditioner, &mut u, &cg, observe);
+    let info = minimise_or_fall_back(
+        &model,
+        &held,
+        &preconditioner,
+        &mut u,
+        &cg,
+        ENERGY_ALONE,
+        observe,
+    );
     drop(preconditioner);
     let moduli = assess(&model, mesh, grips, &loaded, &u, &info);
     let force_n = moduli.from_reaction_mpa * loaded.area_mm2 * params.strain;

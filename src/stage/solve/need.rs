@@ -1,0 +1,201 @@
+//! Owns how much memory a solve takes, told from the bone before anything is built.
+//!
+//! Memory goes with what is kept a node or site (vectors, neighbours, diagonal) and with the boxes of multigrid's
+//! aggregates (the assembled levels). Both factors are fits to the program's own peaks (see `reports/performance.md`).
+
+use crate::error::Result;
+use crate::grid::Grid;
+use crate::mask::resample;
+use crate::stage::lattice::{Case, build_of, build_pieces};
+use crate::stage::solve::bricks::LEAST_FRACTION;
+use crate::stage::solve::tissue::Tissue;
+use crate::stage::solve::{Method, SolveParams};
+use crate::volume::{Specimen, Volume};
+use rayon::prelude::*;
+use std::collections::HashSet;
+
+/// Bytes a node and a box of [`BOX`] nodes; of elements that differ, more a node (a factor and a whole diagonal block).
+const NODE: f64 = 116.0;
+const NODE_BOX: f64 = 3140.0;
+const DIFFERING: f64 = 28.0;
+
+/// Bytes a lattice site and a box of [`SITE_BOX_LP`] lattice parameters; of graded lattices, bonds with their shares.
+const SITE: f64 = 150.0;
+const SITE_BOX: f64 = 3140.0;
+const PIECE: f64 = 1000.0;
+
+/// Edges of multigrid's boxes, in nodes and in lattice parameters.
+const BOX: usize = 5;
+const SITE_BOX_LP: f64 = 4.0;
+
+/// Bytes of a solve beyond the specimen, at their highest.
+///
+/// # Errors
+/// Settings that do not fit the specimen.
+pub fn of_lattice(specimen: &Specimen, case: &Case, params: &SolveParams) -> Result<f64> {
+    let in_boxes = |lp: f64, positions: &mut dyn Iterator<Item = [f64; 3]>| {
+        let edge = SITE_BOX_LP * lp;
+        let boxes: HashSet<[i32; 3]> = positions
+            .map(|x| x.map(|v| (v / edge).floor() as i32))
+            .collect();
+        boxes.len() as f64
+    };
+    if case.in_pieces() {
+        let pieces = build_pieces(specimen, case, params.axis, params.grip_mm)?;
+        let mut positions = pieces.indices.iter().map(|i| pieces.frame.position_mm(*i));
+        let boxes = in_boxes(case.lp_mm, &mut positions);
+        return Ok(pieces.len() as f64 * PIECE + boxes * SITE_BOX);
+    }
+    let tissue = Tissue::of(specimen, params)?;
+    let factors = match &tissue {
+        Tissue::Uniform(_) => None,
+        Tissue::Mixed(mixed) => Some(&mixed.factor[..]),
+    };
+    let sites = build_of(specimen, factors, case, params.axis, params.grip_mm)?;
+    let mut positions = sites.indices.iter().map(|i| sites.frame.position_mm(*i));
+    let boxes = in_boxes(case.lp_mm, &mut positions);
+    Ok(sites.len() as f64 * SITE + boxes * SITE_BOX)
+}
+
+/// The same for voxel elements.
+pub fn of_voxel_fe(specimen: &Specimen, params: &SolveParams) -> f64 {
+    let grid = &specimen.bone.grid;
+    let differing = params.coarsen > 1 || params.material.is_some();
+    let (counts, elements_grid) = match params.coarsen {
+        1 => (Counts::of(&specimen.bone), grid.len() as f64),
+        factor => {
+            let fractions = resample::coarsen(&specimen.bone, factor);
+            let bone = fractions.as_slice().iter();
+            let bone = bone.map(|f| u8::from(*f >= LEAST_FRACTION)).collect();
+            let coarse = Volume::from_vec(fractions.grid, bone);
+            // Fractions stay while elements are made of them.
+            (Counts::of(&coarse), 4.0 * coarse.grid.len() as f64)
+        }
+    };
+    let refine = params.refine as f64;
+    let nodes = counts.nodes_refined(refine);
+    // Finer boxes fill in the same proportion to nodes as those of the finest count that was made.
+    let boxes = counts.boxes * nodes / counts.nodes;
+    let masks = if params.refine > 1 {
+        refine.powi(3) * elements_grid
+    } else {
+        0.0
+    };
+    let node = if differing { NODE + DIFFERING } else { NODE };
+    masks + nodes * node + boxes * NODE_BOX
+}
+
+/// What a mask's elements are made of.
+struct Counts {
+    elements: f64,
+    faces: f64,
+    nodes: f64,
+    boxes: f64,
+}
+
+impl Counts {
+    fn of(bone: &Volume<u8>) -> Self {
+        let (grid, voxels) = (bone.grid, bone.as_slice());
+        let is_bone = |at: [usize; 3]| voxels[grid.index(at)] != 0;
+        let of_plane = |z: usize| {
+            let (mut elements, mut shared) = (0usize, 0usize);
+            for at in plane(grid.n, z).filter(|at| is_bone(*at)) {
+                elements += 1;
+                for a in 0..3 {
+                    let mut next = at;
+                    next[a] += 1;
+                    shared += usize::from(next[a] < grid.n[a] && is_bone(next));
+                }
+            }
+            [elements, 6 * elements - shared]
+        };
+        let [elements, faces] = sum((0..grid.n[2]).into_par_iter().map(of_plane));
+        let [nodes, boxes] = nodes_and_boxes(&grid, is_bone);
+        Counts {
+            elements: elements as f64,
+            faces: faces as f64,
+            nodes: nodes as f64,
+            boxes: boxes as f64,
+        }
+    }
+
+    /// Nodes with `r` elements along a voxel's edge: those inside voxels, faces and edges, and the nodes there are. How
+    /// many edges there are follows from the rest (Euler); tunnels and cavities are too few to count.
+    fn nodes_refined(&self, r: f64) -> f64 {
+        let edges = self.nodes + self.faces - self.elements;
+        let inner = r - 1.0;
+        inner.powi(3) * self.elements + inner.powi(2) * self.faces + inner * edges + self.nodes
+    }
+}
+
+fn plane([nx, ny, _]: [usize; 3], z: usize) -> impl Iterator<Item = [usize; 3]> {
+    (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z]))
+}
+
+fn sum(pairs: impl ParallelIterator<Item = [usize; 2]>) -> [usize; 2] {
+    pairs.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
+}
+
+/// Corners of bone voxels, and boxes of [`BOX`] nodes that hold some.
+fn nodes_and_boxes(grid: &Grid, is_bone: impl Fn([usize; 3]) -> bool + Sync) -> [usize; 2] {
+    let n = grid.n.map(|n| n + 1);
+    let is_node = |at: &[usize; 3]| {
+        (0..8).any(|corner| {
+            let back = |a: usize| {
+                at[a]
+                    .checked_sub(corner >> a & 1)
+                    .filter(|v| *v < grid.n[a])
+            };
+            match (back(0), back(1), back(2)) {
+                (Some(x), Some(y), Some(z)) => is_bone([x, y, z]),
+                _ => false,
+            }
+        })
+    };
+    let across = [n[0].div_ceil(BOX), n[1].div_ceil(BOX)];
+    let layer = |layer: usize| {
+        let mut held = vec![false; across[0] * across[1]];
+        let mut nodes = 0;
+        for z in layer * BOX..((layer + 1) * BOX).min(n[2]) {
+            for [x, y, _] in plane(n, z).filter(is_node) {
+                nodes += 1;
+                held[y / BOX * across[0] + x / BOX] = true;
+            }
+        }
+        [nodes, held.iter().filter(|h| **h).count()]
+    };
+    sum((0..n[2].div_ceil(BOX)).into_par_iter().map(layer))
+}
+
+/// Bytes of one job.
+///
+/// # Errors
+/// As [`of_lattice`].
+pub fn of(specimen: &Specimen, case: Option<&Case>, params: &SolveParams) -> Result<f64> {
+    match (params.method, case) {
+        (Method::Lattice, Some(case)) => of_lattice(specimen, case, params),
+        _ => Ok(of_voxel_fe(specimen, params)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_of_refined_voxels_are_counted_without_refining() {
+        // An angle of 6 × 2 × 2 and 2 × 2 × 6 voxels.
+        let grid = Grid::new([6, 5, 7], [0.02; 3]);
+        let is_bone = |[x, y, z]: [usize; 3]| y < 2 && z < 6 && (z < 2 || x < 2);
+        let at = |i: usize| [i % 6, i / 6 % 5, i / 30];
+        let voxels = (0..grid.len()).map(|i| u8::from(is_bone(at(i)))).collect();
+        let bone = Volume::from_vec(grid, voxels);
+        let counts = Counts::of(&bone);
+        for factor in [2, 3] {
+            let fine = Counts::of(&resample::refine(&bone, factor));
+            // One piece without tunnels: Euler's number is 1, which the estimate leaves out.
+            let left_out = factor as f64 - 1.0;
+            assert_eq!(counts.nodes_refined(factor as f64) - left_out, fine.nodes);
+        }
+    }
+}

@@ -8,7 +8,7 @@
 //! | 0 | [`error`], [`par`], [`simd`] | what is told to the person at the keyboard; vector sums that repeat on any number of threads; eight lanes chosen at run time |
 //! | 1 | [`grid`] | indices, voxels, millimetres |
 //! | 2 | [`volume`] | values on a grid; the segmented specimen |
-//! | 3 | [`mask`] | smoothing, thresholds, volumes of interest, connected components |
+//! | 3 | [`mask`] | turning and resampling, smoothing, thresholds, volumes of interest, connected components |
 //! | 4 | [`topology`] | who touches whom: lattice sites, voxel meshes, families of points |
 //! | 5 | [`operator`] | the seam: what a solver may know of a model |
 //! | 6 | [`physics`] and [`solve`] | energies and forces; algorithms. Neither imports the other |

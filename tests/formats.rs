@@ -60,7 +60,7 @@ pub fn sound_files() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 fn aim_v3(data: &[u8]) -> Vec<u8> {
-    let log = b"! Mu_Scaling 8192\nHU: mu water 0.2409\nDensity: slope 1603.5\nDensity: intercept -391.2\n";
+    let log = b"! Mu_Scaling 8192\nHU: mu water 0.2409\nDensity: slope 1603.5\nDensity: intercept -391.2\nPatient Name  Doe-Zwiebelfisch\n";
     let mut out = b"AIMDATA_V030   \0".to_vec();
     for size in [40i64, 224, log.len() as i64, data.len() as i64, 0] {
         out.extend(size.to_le_bytes());
@@ -99,6 +99,7 @@ pub fn isq(data: &[u8]) -> Vec<u8> {
         head[56 + 4 * a..60 + 4 * a].copy_from_slice(&(20 * n).to_le_bytes());
     }
     head[88..92].copy_from_slice(&4096i32.to_le_bytes());
+    head[128..144].copy_from_slice(b"Doe-Zwiebelfisch");
     [head, data.to_vec()].concat()
 }
 
@@ -139,6 +140,8 @@ pub fn dicom(data: &[u8], implicit: bool) -> Vec<u8> {
         text(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2"),
         text(8, 0x18, "UI", "1.2.3.4"),
         text(0x10, 0x10, "PN", "Patient^Jane"),
+        text(0x10, 0x20, "LO", "Id-Kuckuck"),
+        text(0x10, 0x30, "DA", "19530417"),
         text(0x18, 0x50, "DS", "0.06"),
         text(0x20, 0xE, "UI", "1.2.3"),
         text(0x20, 0x13, "IS", "1"),

@@ -2,13 +2,14 @@
 
 use super::{print_json, words};
 use bonepd_ct::error::Result;
+use bonepd_ct::grid::Axis;
 use bonepd_ct::run::Outcome;
 use bonepd_ct::run::session::Session;
-use bonepd_ct::stage::segment::{GreyUnit, SegmentParams, Voi};
+use bonepd_ct::stage::segment::{Align, AlignBox, GreyUnit, SegmentParams, Voi};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Find the bone in a scan: crop, smooth, threshold, volume of interest, largest connected piece
+/// Find the bone in a scan: crop, turn, smooth, threshold, volume of interest, largest connected piece
 ///
 /// Writes DIR/mask.nii.gz (1 where bone), DIR/segment.json (what is needed to repeat it, BV, TV, BV/TV) and
 /// DIR/segment.png (mid-slices with the mask's outline).
@@ -54,6 +55,21 @@ pub struct SegmentSettings {
     /// Keep voxels first:end along each axis; the end is not included
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = words::crop)]
     crop: Option<[[usize; 2]; 3]>,
+    /// Turn the scan so that this axis of it becomes z, the load axis; the other two follow [default: z]
+    #[arg(long, value_name = "AXIS", value_parser = words::choice::<Axis>(&["x", "y", "z"]))]
+    turn: Option<Axis>,
+    /// Bring the scan to this voxel size in mm, one number or one per axis (after the turn)
+    #[arg(long, value_name = "MM[,MM,MM]", value_parser = words::sizes)]
+    resample: Option<[f64; 3]>,
+    /// Rotate the scan until this points along z: fabric (the longest mean intercept lengths), or X,Y,Z
+    #[arg(long, value_name = "fabric|X,Y,Z", value_parser = words::align, allow_negative_numbers = true)]
+    align: Option<Align>,
+    /// Of a rotated scan: the box that lies inside the old one, or the whole of it with pore around [default: inside]
+    #[arg(long, value_name = "BOX", value_parser = words::choice::<AlignBox>(&["inside", "whole"]))]
+    align_box: Option<AlignBox>,
+    /// Cut uneven ends flat: to planes with bone in every tile of this width (mm) that holds any
+    #[arg(long, value_name = "MM", value_parser = words::positive)]
+    plane_cut: Option<f64>,
     /// Keep every voxel, not only the largest connected piece
     #[arg(long)]
     keep_all: bool,
@@ -88,6 +104,11 @@ impl SegmentSettings {
         params.lower = self.lower.or(params.lower);
         params.upper = self.upper.or(params.upper);
         params.crop = self.crop.or(params.crop);
+        params.turn = self.turn.unwrap_or(params.turn);
+        params.resample_mm = self.resample.or(params.resample_mm);
+        params.align = self.align.or(params.align);
+        params.align_box = self.align_box.unwrap_or(params.align_box);
+        params.plane_cut_mm = self.plane_cut.or(params.plane_cut_mm);
         params.keep_all |= self.keep_all;
         params.morphometry |= self.morphometry;
         if let Some(sigma) = self.gaussian {

@@ -1,7 +1,7 @@
 //! Owns the words of the command line: lists, percentages, crops, choices; from text to plain values.
 
 use bonepd_ct::physics::material::{Label, Law};
-use bonepd_ct::stage::segment::Voi;
+use bonepd_ct::stage::segment::{Align, Voi};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as WordError, StrDeserializer};
@@ -132,6 +132,16 @@ fn range(word: &str) -> Result<[usize; 2], String> {
     }
 }
 
+/// `fabric` or a direction `X,Y,Z`.
+pub fn align(word: &str) -> Result<Align, String> {
+    match word {
+        "fabric" => Ok(Align::Fabric),
+        _ => triple(word)
+            .map(Align::Direction)
+            .map_err(|_| format!("expected fabric or a direction X,Y,Z, found `{word}`")),
+    }
+}
+
 /// `box`, `cylinder`, `cylinder:D`, `cylinder:D,X,Y` (mm), or a mask file.
 pub fn voi(word: &str) -> Result<Voi, String> {
     if word == "box" {
@@ -201,6 +211,13 @@ mod tests {
         assert_eq!(voi("cylinder:5,1,2"), shape(Some(5.0), Some([1.0, 2.0])));
         assert_eq!(voi("voi.nii.gz"), Ok(Voi::Mask("voi.nii.gz".into())));
         assert!(voi("cylinder:0").is_err());
+    }
+
+    #[test]
+    fn an_alignment_is_the_fabric_or_a_direction() {
+        assert_eq!(align("fabric"), Ok(Align::Fabric));
+        assert_eq!(align("0,-1,2"), Ok(Align::Direction([0.0, -1.0, 2.0])));
+        assert!(align("1,2").is_err());
     }
 
     #[test]

@@ -93,6 +93,15 @@ pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: GreyUnit) -> Res
     })
 }
 
+/// Values with their axes as stored, whatever the orientation says: masks and grey values of a segmented scan, which may
+/// have been turned. `spacing_mm` is the voxel size.
+pub fn read_as_stored(path: &Path, spacing_mm: [f64; 3]) -> Result<Volume<f32>> {
+    let stored = stored(path)?;
+    let mut volume = Volume::from_vec(Grid::new(stored.n, spacing_mm), stored.values);
+    volume.affine = stored.affine;
+    Ok(volume)
+}
+
 /// Files of other formats hold the unit they were saved in: nothing to convert, but a contradiction is an error.
 fn calibrate(stored: &mut Stored, unit: GreyUnit, path: &Path) -> Result<()> {
     let Some(calibration) = stored.calibration else {

@@ -68,20 +68,20 @@ pub fn load(dir: &Path) -> Result<Specimen> {
         )
     })?;
     let mask = dir.join(MASK);
-    let stored = scan::read(&mask, Some(record.results.spacing_mm))?;
-    if stored.volume.grid.n != record.results.voxels {
+    let stored = scan::read_as_stored(&mask, record.results.spacing_mm)?;
+    if stored.grid.n != record.results.voxels {
         return Err(Error::file(
             &mask,
             format!(
                 "has {:?} voxels where {RECORD} says {:?}",
-                stored.volume.grid.n, record.results.voxels
+                stored.grid.n, record.results.voxels
             ),
             again,
         ));
     }
     Ok(Specimen {
         name: record.scan,
-        bone: mask_of(&stored.volume),
+        bone: mask_of(&stored),
         tv_mm3: record.results.tv_mm3,
         tv_definition: record.results.tv_definition,
         grey: None,
@@ -94,7 +94,7 @@ pub fn load_grey(dir: &Path, bone: &Volume<u8>) -> Result<Option<Volume<f32>>> {
     if !path.exists() {
         return Ok(None);
     }
-    let grey = scan::read(&path, Some(bone.grid.spacing_mm))?.volume;
+    let grey = scan::read_as_stored(&path, bone.grid.spacing_mm)?;
     if grey.grid.n != bone.grid.n {
         return Err(Error::file(
             &path,

@@ -1,7 +1,10 @@
-//! From grey values to bone: smoothing, thresholds, volumes of interest, connected components.
+//! From grey values to bone: other grids, smoothing, thresholds, volumes of interest, connected components.
 
 pub mod components;
+pub mod ends;
 pub mod gaussian;
+pub mod regrid;
 pub mod resample;
+pub mod rotate;
 pub mod threshold;
 pub mod voi;

@@ -32,6 +32,47 @@ pub struct Fabric {
 /// The fabric of bone within its box or, where given, the part of it that is `within` (non-zero). None without surface,
 /// or where lines of some direction never leave the bone (perfect plates and rods).
 pub fn fabric(bone: &Volume<u8>, within: Option<&Volume<u8>>) -> Option<Fabric> {
+    let fit = fitted(bone, within)?;
+    // Ascending: the longest first. An axis fifty times the mean is a line that never leaves the bone.
+    if fit.squares[0] < 4e-4 {
+        return None;
+    }
+    let mil_mm = fit.squares.map(|square| fit.scale_mm / square.sqrt());
+    Some(Fabric {
+        mil_mm,
+        directions: fit.directions,
+        da: mil_mm[0] / mil_mm[2],
+    })
+}
+
+/// The direction of the longest mean intercept, and by how much it is longer than the next (infinite for perfect rods).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Principal {
+    /// Unit vector x, y, z, with z not below 0.
+    pub direction: [f64; 3],
+    /// Longest over second longest half-axis, at least 1.
+    pub ratio: f64,
+}
+
+/// The main direction of bone, also where it has no ellipsoid; `within` as for [`fabric`]. None without surface.
+pub fn principal(bone: &Volume<u8>, within: Option<&Volume<u8>>) -> Option<Principal> {
+    let fit = fitted(bone, within)?;
+    let [first, second, _] = fit.squares.map(|square| square.max(1e-12));
+    Some(Principal {
+        direction: fit.directions[0],
+        ratio: (second / first).sqrt(),
+    })
+}
+
+/// `1 / MIL²` along its own axes.
+struct Fit {
+    /// Over `1 / scale²`, ascending.
+    squares: [f64; 3],
+    directions: [[f64; 3]; 3],
+    scale_mm: f64,
+}
+
+fn fitted(bone: &Volume<u8>, within: Option<&Volume<u8>>) -> Option<Fit> {
     let smooth = smoothed(bone);
     let room = within.map(smoothed);
     let [nx, ny, nz] = bone.grid.n;
@@ -96,9 +137,9 @@ fn direction(i: usize) -> [f64; 3] {
     [r * angle.cos(), r * angle.sin(), z]
 }
 
-/// Least squares of `nᵀ M n = 1 / MIL²`, scaled to the mean.
-fn ellipsoid(directions: &[[f64; 3]], lengths: &[f64]) -> Option<Fabric> {
-    let scale = lengths.iter().sum::<f64>() / lengths.len() as f64;
+/// Least squares of `nᵀ M n = 1 / MIL²`, scaled to the (harmonic) mean: lengths may be infinite.
+fn ellipsoid(directions: &[[f64; 3]], lengths: &[f64]) -> Option<Fit> {
+    let scale = lengths.len() as f64 / lengths.iter().map(|l| 1.0 / l).sum::<f64>();
     let terms = |[x, y, z]: [f64; 3]| [x * x, y * y, z * z, 2.0 * x * y, 2.0 * y * z, 2.0 * z * x];
     let a = Mat::from_fn(lengths.len(), 6, |i, j| terms(directions[i])[j]);
     let b = Mat::from_fn(lengths.len(), 1, |i, _| (scale / lengths[i]).powi(2));
@@ -112,20 +153,15 @@ fn ellipsoid(directions: &[[f64; 3]], lengths: &[f64]) -> Option<Fabric> {
         .self_adjoint_eigen(Side::Lower)
         .ok()?;
     let (values, vectors) = (eigen.S().column_vector(), eigen.U());
-    // Ascending: the longest first. An axis fifty times the mean is a line that never leaves the bone.
-    if values[0] < 4e-4 {
-        return None;
-    }
-    let mil_mm = std::array::from_fn(|i| scale / values[i].sqrt());
     let directions = std::array::from_fn(|i| {
         let v: [f64; 3] = std::array::from_fn(|a| vectors[(a, i)]);
         let sign = if v[2] < 0.0 { -1.0 } else { 1.0 };
         v.map(|c| sign * c)
     });
-    Some(Fabric {
-        mil_mm,
+    Some(Fit {
+        squares: std::array::from_fn(|i| values[i]),
         directions,
-        da: mil_mm[0] / mil_mm[2],
+        scale_mm: scale,
     })
 }
 
@@ -187,6 +223,11 @@ mod tests {
     fn perfect_rods_and_plates_have_no_ellipsoid_and_broken_ones_point_along_themselves() {
         let rod = |p: [f64; 3]| (p[0] - 0.3).powi(2) + (p[1] - 0.3).powi(2) < 0.04;
         assert!(fabric(&mask(30, [0.02; 3], rod), None).is_none());
+        let along = principal(&mask(30, [0.02; 3], rod), None).unwrap();
+        assert!(
+            along.direction[2] > 0.9999 && along.ratio > 50.0,
+            "{along:?}"
+        );
         assert!(fabric(&mask(30, [0.02; 3], |p| p[0] % 0.2 < 0.1), None).is_none());
         // A rod in pieces, 0.5 long and 0.2 across.
         let pieces =

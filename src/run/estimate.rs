@@ -65,17 +65,21 @@ pub fn estimate(input: &Path, spacing_mm: Option<[f64; 3]>, recipe: &Recipe) -> 
     let size_mm = voxels
         .zip(spacing)
         .map(|(n, h)| [0, 1, 2].map(|a| n[a] as f64 * h[a]));
+    let worked_on = match (recipe.segment.resample_mm, size_mm) {
+        (Some(to), Some(size)) => (0..3).map(|a| size[a] / to[a]).product(),
+        _ => voxels.map_or(read, count),
+    };
     let (model_bytes, time_s) = match recipe.solve.method {
         Method::Lattice => lattice(size_mm, recipe),
         Method::VoxelFe => {
             let scale = (recipe.solve.refine as f64 / recipe.solve.coarsen as f64).powi(3);
-            let elements = voxels.map_or(read, count) * FILLED * scale;
+            let elements = worked_on * FILLED * scale;
             (elements * BYTES_PER_ELEMENT, Some(elements * S_PER_ELEMENT))
         }
     };
     Estimate {
         voxels: extent.map(|e| e.voxels),
-        memory_mib: mib(BASE + (read * BYTES_PER_VOXEL).max(model_bytes)),
+        memory_mib: mib(BASE + (read.max(worked_on) * BYTES_PER_VOXEL).max(model_bytes)),
         time_s,
     }
 }

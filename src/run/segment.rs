@@ -50,7 +50,7 @@ pub fn segment(
     };
     say(&record, session);
     if !session.dry_run {
-        write(dir, &record, &scan.volume, &segmented.specimen)?;
+        write(dir, &record, &segmented.scan, &segmented.specimen)?;
     }
     Ok(record)
 }
@@ -112,11 +112,7 @@ fn write(
     atomic::create_dir(dir)?;
     // An old record must not vouch for a new mask, should the program be stopped between the two.
     let _ = std::fs::remove_file(dir.join(specimen::RECORD));
-    let picture_path = dir.join(specimen::PICTURE);
-    match &record.settings.crop {
-        Some(crop) => picture::write(&picture_path, &scan.cropped(crop), &specimen.bone)?,
-        None => picture::write(&picture_path, scan, &specimen.bone)?,
-    }
+    picture::write(&dir.join(specimen::PICTURE), scan, &specimen.bone)?;
     specimen::write(dir, specimen, record)
 }
 
@@ -132,6 +128,19 @@ fn say(record: &SegmentRecord, session: &Session) {
             "{}: Otsu's threshold {}",
             record.scan,
             r.lower.unwrap_or(f64::NAN)
+        ));
+    }
+    if let Some(turn) = &r.rotation {
+        let [x, y, z] = turn.direction;
+        session.say(format!(
+            "{}: turned by {:.1}°: ({x:.3}, {y:.3}, {z:.3}) of the scan is now z",
+            record.scan, turn.angle_deg
+        ));
+    }
+    if let Some([low, high]) = r.plane_cut_mm {
+        session.say(format!(
+            "{}: ends cut flat, {low:.3} mm off the lower and {high:.3} mm off the upper",
+            record.scan
         ));
     }
     session.say(format!(

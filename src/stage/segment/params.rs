@@ -1,6 +1,7 @@
 //! Owns the settings of segmentation, and which of them contradict each other.
 
 use crate::error::{Error, Result};
+use crate::grid::Axis;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -33,6 +34,27 @@ pub enum GreyUnit {
     Mgha,
 }
 
+/// A direction that is rotated to z, the load axis, by the shortest way.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Align {
+    /// That of the longest mean intercept lengths of the bone.
+    Fabric,
+    /// x, y, z of the scan after `turn`; of any length but 0.
+    Direction([f64; 3]),
+}
+
+/// What becomes of the box of a scan that is rotated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum AlignBox {
+    /// A box that lies wholly in the old one: bone that fills its scan.
+    #[default]
+    Inside,
+    /// The box around it, with pore where there was no scan: an excised core in air.
+    Whole,
+}
+
 /// Settings of `segment`. A voxel is bone when `lower <= value <= upper`, in the image's own units, after smoothing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
@@ -52,6 +74,15 @@ pub struct SegmentParams {
     pub voi: Voi,
     /// First and past-the-last voxel along x, y, z.
     pub crop: Option<[[usize; 2]; 3]>,
+    /// The scan's axis that becomes z, the load axis; the others follow in turn. After the crop.
+    pub turn: Axis,
+    /// Voxel size along x, y, z that the scan is brought to, after `turn`.
+    pub resample_mm: Option<[f64; 3]>,
+    /// What is rotated to z; voxels become cubes of their shortest edge.
+    pub align: Option<Align>,
+    pub align_box: AlignBox,
+    /// Cut both ends (along z) to planes with bone in every tile of this edge that holds any.
+    pub plane_cut_mm: Option<f64>,
     /// Keep every voxel, not only the largest 6-connected component.
     pub keep_all: bool,
     /// Also keep the values of bone voxels, for moduli that follow them.
@@ -133,6 +164,33 @@ impl SegmentParams {
                 format!("expected first < end, found {first}:{end}"),
                 "the end is not included: 0:100 keeps 100 voxels",
             );
+        }
+        self.check_place()
+    }
+
+    fn check_place(&self) -> Result<()> {
+        let refuse = |key: &str, found: String, advice: &str| {
+            Err(Error::setting(format!("segment.{key}"), found, advice))
+        };
+        let length = |v: &f64| *v > 0.0 && v.is_finite();
+        if let Some(sizes) = self.resample_mm
+            && !sizes.iter().all(length)
+        {
+            let found = format!("expected voxel sizes in mm above 0, found {sizes:?}");
+            return refuse("resample_mm", found, "give one number, or one per axis");
+        }
+        if let Some(Align::Direction(d)) = self.align {
+            let squared: f64 = d.iter().map(|v| v * v).sum();
+            if !length(&squared) {
+                let found = format!("expected a direction X,Y,Z, found {d:?}");
+                return refuse("align", found, "0,0,1 changes nothing; or say fabric");
+            }
+        }
+        if let Some(edge) = self.plane_cut_mm
+            && !length(&edge)
+        {
+            let found = format!("expected the edge of a tile in mm above 0, found {edge}");
+            return refuse("plane_cut_mm", found, "1 is wider than most pores are");
         }
         Ok(())
     }

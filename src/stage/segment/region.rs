@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::mask::voi::Inside;
 use crate::volume::Volume;
+use std::path::Path;
 
 pub(super) fn check_crop(crop: &[[usize; 2]; 3], n: [usize; 3]) -> Result<()> {
     for (a, [from, to]) in crop.iter().enumerate() {
@@ -21,6 +22,22 @@ pub(super) fn check_crop(crop: &[[usize; 2]; 3], n: [usize; 3]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+pub(super) fn same_grid(path: &Path, mask: &Volume<u8>, grid: Grid) -> Result<()> {
+    if mask.grid.n == grid.n {
+        return Ok(());
+    }
+    Err(Error::setting(
+        "voi",
+        format!(
+            "{} has {:?} voxels, the scan has {:?}",
+            path.display(),
+            mask.grid.n,
+            grid.n
+        ),
+        "give a mask on the scan's own grid",
+    ))
 }
 
 pub(super) fn inside<'a>(
@@ -66,29 +83,16 @@ pub(super) fn inside<'a>(
             ))
         }
         Voi::Mask(path) => {
-            let shown = path.display();
-            match mask {
-                Some(mask) if mask.grid.n == grid.n => Ok((
-                    Inside::Mask(mask),
-                    format!(
-                        "mask {}",
-                        path.file_name().unwrap_or_default().to_string_lossy()
-                    ),
-                )),
-                Some(mask) => Err(Error::setting(
+            let Some(mask) = mask else {
+                return Err(Error::setting(
                     "voi",
-                    format!(
-                        "{shown} has {:?} voxels, the scan has {:?}",
-                        mask.grid.n, grid.n
-                    ),
-                    "give a mask on the scan's own grid",
-                )),
-                None => Err(Error::setting(
-                    "voi",
-                    format!("{shown} was not read"),
+                    format!("{} was not read", path.display()),
                     "give a mask file that exists",
-                )),
-            }
+                ));
+            };
+            same_grid(path, mask, grid)?;
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            Ok((Inside::Mask(mask), format!("mask {name}")))
         }
     }
 }

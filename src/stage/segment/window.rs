@@ -87,7 +87,20 @@ pub(super) fn window(
         })
 }
 
-pub(super) fn select(
+/// The voxels that are bone by the window or the labels, in a scan whose values and window are known.
+pub(super) fn bone_of(
+    scan: &Volume<f32>,
+    params: &SegmentParams,
+    grey: &Grey,
+    (lower, upper): (Option<f64>, Option<f64>),
+) -> Volume<u8> {
+    match params.labels.is_empty() {
+        true => select(scan, params.gaussian_voxels, grey, lower, upper),
+        false => labelled(scan, &params.labels),
+    }
+}
+
+fn select(
     scan: &Volume<f32>,
     sigma: f64,
     grey: &Grey,
@@ -135,7 +148,7 @@ pub(super) fn nothing_selected(lower: Option<f64>, upper: Option<f64>, grey: &Gr
 }
 
 /// 1 where the value is one of the labels.
-pub(super) fn labelled(scan: &Volume<f32>, labels: &[i32]) -> Volume<u8> {
+fn labelled(scan: &Volume<f32>, labels: &[i32]) -> Volume<u8> {
     let labels: Vec<f32> = labels.iter().map(|&l| l as f32).collect();
     let voxels = scan.as_slice().par_iter();
     let bone = voxels.map(|v| u8::from(labels.contains(v))).collect();

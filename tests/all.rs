@@ -8,6 +8,7 @@ mod exports;
 mod fields;
 mod formats;
 mod fuzz;
+mod info;
 mod laws;
 mod layers;
 mod made;

@@ -6,7 +6,7 @@ use bonepd_ct::run::Outcome;
 use clap::Args;
 use std::path::PathBuf;
 
-/// Print what is known of a scan: size, voxel size, values, orientation
+/// Print what is known of a scan: size, voxel size, values, calibration, orientation, what to threshold by
 #[derive(Args)]
 pub struct InfoArgs {
     /// The scan: a file or a folder of slices

@@ -1,11 +1,13 @@
 //! `lattice`: sites and bonds over the bone.
 
+use super::solve::TissueSettings;
 use super::{print_json, words};
 use bonepd_ct::error::Result;
 use bonepd_ct::run::Outcome;
-use bonepd_ct::run::lattice::Export;
+use bonepd_ct::run::lattice::{Export, Exports};
 use bonepd_ct::run::session::Session;
 use bonepd_ct::stage::lattice::{Boundary, LatticeParams, Structure};
+use bonepd_ct::stage::solve::SolveParams;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -22,6 +24,11 @@ pub struct LatticeArgs {
     /// Also write each lattice for another program: lammps (data file), vtk (ParaView, OVITO)
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', value_parser = ["lammps", "vtk"])]
     export: Vec<String>,
+    /// Of an exported model: different stiffnesses of bonds at most; more are rounded to the means of as many bins
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
+    bins: u16,
+    #[command(flatten, next_help_heading = "Tissue of exported lattices (lammps)")]
+    tissue: TissueSettings,
 }
 
 #[derive(Args)]
@@ -61,7 +68,12 @@ impl LatticeSettings {
 pub fn run(args: &LatticeArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut params = LatticeParams::default();
     args.settings.apply(&mut params)?;
-    let exports: Vec<Export> = args.export.iter().map(|word| export(word)).collect();
+    let mut exports = Exports {
+        formats: args.export.iter().map(|word| export(word)).collect(),
+        tissue: SolveParams::default(),
+        bins: args.bins.into(),
+    };
+    args.tissue.apply(&mut exports.tissue)?;
     let lattices = bonepd_ct::run::lattice::lattice(&args.dir, &params, &exports, session)?;
     if json {
         print_json(&lattices);

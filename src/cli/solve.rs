@@ -31,20 +31,17 @@ pub struct SolveArgs {
     /// voxel-fe: also write the model for another program: inp (CalculiX, Abaqus)
     #[arg(long, value_name = "FORMAT", value_parser = ["inp"])]
     export: Option<String>,
+    /// Of an exported model: different moduli at most; more are rounded to the means of as many bins
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
+    bins: u16,
 }
 
+/// What bone is made of.
 #[derive(Args)]
-#[command(next_help_heading = "Solve")]
-pub struct SolveSettings {
-    /// lattice (the lattice element method), or voxel-fe (one hexahedron per bone voxel) [default: lattice]
-    #[arg(long, value_parser = words::choice::<Method>(&["lattice", "voxel-fe"]))]
-    method: Option<Method>,
+pub struct TissueSettings {
     /// Young's modulus of the bone tissue in MPa [default: 1000]
     #[arg(long, value_name = "E", value_parser = words::positive)]
     young_mpa: Option<f64>,
-    /// Poisson's ratio of the bone tissue, below 0.5 [default: 0.3]
-    #[arg(long, value_name = "NU", value_parser = words::number, allow_negative_numbers = true)]
-    poisson: Option<f64>,
     /// Moduli that differ from voxel to voxel: labels:100=6829/0.3,127=10000 (E, and ν if another), power:C,N (E = C·ρ^N),
     /// linear:A,B (E = A·ρ + B), homminga:FULL[,N] (E = young-mpa·(ρ/FULL)^N, N 1.7); ρ are the scan's values. Needs
     /// `segment --keep-grey` or `--labels`
@@ -56,6 +53,44 @@ pub struct SolveSettings {
     /// Raise smaller moduli of a law to this
     #[arg(long, value_name = "E", value_parser = words::positive)]
     least_mpa: Option<f64>,
+}
+
+impl TissueSettings {
+    /// What was said here wins over `params`.
+    pub fn apply(&self, params: &mut SolveParams) -> Result<()> {
+        params.young_mpa = self.young_mpa.unwrap_or(params.young_mpa);
+        if let Some(law) = &self.material {
+            params.material = Some(Material::new(law.clone()));
+        }
+        match &mut params.material {
+            Some(material) => {
+                material.density = self.density.unwrap_or(material.density);
+                material.least_mpa = self.least_mpa.or(material.least_mpa);
+            }
+            None if self.density.is_some() || self.least_mpa.is_some() => {
+                return Err(Error::setting(
+                    "--density, --least-mpa",
+                    "they belong to a law of moduli, and none is given",
+                    "add --material, or leave them out",
+                ));
+            }
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Solve")]
+pub struct SolveSettings {
+    /// lattice (the lattice element method), or voxel-fe (one hexahedron per bone voxel) [default: lattice]
+    #[arg(long, value_parser = words::choice::<Method>(&["lattice", "voxel-fe"]))]
+    method: Option<Method>,
+    #[command(flatten)]
+    tissue: TissueSettings,
+    /// Poisson's ratio of the bone tissue, below 0.5 [default: 0.3]
+    #[arg(long, value_name = "NU", value_parser = words::number, allow_negative_numbers = true)]
+    poisson: Option<f64>,
     /// Nominal strain; negative is compression [default: -0.01]
     #[arg(long, value_name = "S", value_parser = words::number, allow_negative_numbers = true)]
     strain: Option<f64>,
@@ -106,7 +141,7 @@ impl SolveSettings {
     /// What was said here wins over `params`.
     pub fn apply(&self, params: &mut SolveParams) -> Result<()> {
         params.method = self.method.unwrap_or(params.method);
-        params.young_mpa = self.young_mpa.unwrap_or(params.young_mpa);
+        self.tissue.apply(params)?;
         params.poisson = self.poisson.unwrap_or(params.poisson);
         params.strain = self.strain.unwrap_or(params.strain);
         params.grip_mm = self.grip_mm.unwrap_or(params.grip_mm);
@@ -118,23 +153,6 @@ impl SolveSettings {
         params.refine = self.refine.map_or(params.refine, usize::from);
         params.coarsen = self.coarsen.map_or(params.coarsen, usize::from);
         params.mechanisms |= self.mechanisms;
-        if let Some(law) = &self.material {
-            params.material = Some(Material::new(law.clone()));
-        }
-        match &mut params.material {
-            Some(material) => {
-                material.density = self.density.unwrap_or(material.density);
-                material.least_mpa = self.least_mpa.or(material.least_mpa);
-            }
-            None if self.density.is_some() || self.least_mpa.is_some() => {
-                return Err(Error::setting(
-                    "--density, --least-mpa",
-                    "they belong to a law of moduli, and none is given",
-                    "add --material, or leave them out",
-                ));
-            }
-            None => {}
-        }
         if !self.fields.is_empty() {
             params.fields.clone_from(&self.fields);
         }
@@ -153,7 +171,7 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut lattice = bonepd_ct::run::lattice::settings(&args.dir)?;
     args.lattice.apply(&mut lattice)?;
     if args.export.is_some() {
-        bonepd_ct::run::solve::export_inp(&args.dir, &params, session)?;
+        bonepd_ct::run::solve::export_inp(&args.dir, &params, args.bins.into(), session)?;
     }
     let (rows, met) = match args.error {
         Some(target) => {

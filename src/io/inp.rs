@@ -1,10 +1,12 @@
-//! Owns the export of voxel elements as a CalculiX or Abaqus input file: nodes, C3D8 bricks, material, supports, load,
+//! Owns the export of voxel elements as a CalculiX or Abaqus input file: nodes, C3D8 bricks, materials, supports, load,
 //! and the printing of the moving grip's force. mm, N, MPa.
 
 use crate::error::{Error, Result};
 use crate::io::atomic;
+use crate::io::bins::Bins;
 use crate::operator::held::Held;
 use crate::stage::solve::bricks::{Bricks, Keep};
+use crate::stage::solve::tissue::Tissue;
 use crate::stage::solve::voxel_fe::supports;
 use crate::stage::solve::{Ends, Load, Method, SolveParams};
 use crate::topology::voxels::{Planes, VoxelMesh};
@@ -25,11 +27,12 @@ const CORNERS: [[u32; 3]; 8] = [
 ];
 
 /// Writes the elements that join the grips. With free ends two nodes of the lower grip are pinned sideways, which stops
-/// the rigid motions that are left and bears nothing.
+/// the rigid motions that are left and bears nothing. Moduli that differ come to at most `bins` materials per Poisson's
+/// ratio; returned is by what share the element farthest from its material is off.
 ///
 /// # Errors
-/// A method, load or coarsening that has no such file; a specimen that does not join the grips; an unwritable file.
-pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams) -> Result<()> {
+/// A method or load that has no such file; a specimen that does not join the grips; an unwritable file.
+pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize) -> Result<f64> {
     let wrong = |found: &str, advice: &str| Err(Error::setting("--export inp", found, advice));
     if params.method != Method::VoxelFe {
         return wrong("lattices have no bricks", "add --method voxel-fe");
@@ -40,20 +43,63 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams) -> Result<(
             "use --load uniaxial or confined",
         );
     }
-    let Bricks::Equal(model) = Bricks::new(specimen, params, Keep::BetweenGrips)? else {
-        return wrong(
-            "coarsened elements each have a modulus of their own",
-            "leave --coarsen out",
-        );
-    };
-    if model.mesh.is_empty() {
+    let model = Bricks::new(specimen, params, Keep::BetweenGrips)?;
+    let mesh = model.mesh();
+    if mesh.is_empty() {
         return Err(Error::specimen(
             "no path of bone between the loaded faces",
             "there is nothing to export",
         ));
     }
-    let grips = Planes::within(&model.mesh.grid, params.axis, params.grip_mm)?;
-    atomic::write_with(path, |out| fill(out, &model.mesh, grips, params))
+    let grips = Planes::within(&mesh.grid, params.axis, params.grip_mm)?;
+    let (young_mpa, poissons) = match Tissue::of(specimen, params)? {
+        Tissue::Uniform(solid) => (solid.young_mpa, vec![solid.poisson]),
+        Tissue::Mixed(mixed) => (mixed.mean_mpa, mixed.poissons),
+    };
+    let stiffness: Vec<(f64, u8)> = corners(mesh)
+        .map(|node| {
+            let (factor, kind) = model.stiffness_of(node);
+            (young_mpa * f64::from(factor), kind)
+        })
+        .collect();
+    let materials = Materials::of(&stiffness, &poissons, bins.max(1));
+    atomic::write_with(path, |out| fill(out, mesh, grips, params, &materials))?;
+    Ok(materials.worst)
+}
+
+/// The node of smallest x, y, z of each element, in the order of the elements.
+fn corners(mesh: &VoxelMesh) -> impl Iterator<Item = usize> {
+    let nodes = mesh.segments.iter().flat_map(|segment| segment.nodes());
+    nodes.filter(|&node| mesh.around[node] & 0x80 != 0)
+}
+
+/// Materials by number, and that of each element.
+struct Materials {
+    /// MPa, and Poisson's ratio.
+    table: Vec<(f64, f64)>,
+    of: Vec<usize>,
+    worst: f64,
+}
+
+impl Materials {
+    fn of(stiffness: &[(f64, u8)], poissons: &[f64], bins: usize) -> Materials {
+        let young: Vec<f64> = stiffness.iter().map(|s| s.0).collect();
+        let bins = Bins::of(&young, bins);
+        let mut number = vec![None; bins.values.len() * poissons.len()];
+        let mut table = Vec::new();
+        let of = stiffness.iter().zip(&bins.of).map(|(&(_, kind), &bin)| {
+            let (bin, kind) = (bin as usize, usize::from(kind));
+            *number[bin * poissons.len() + kind].get_or_insert_with(|| {
+                table.push((bins.values[bin], poissons[kind]));
+                table.len() - 1
+            })
+        });
+        Materials {
+            of: of.collect(),
+            worst: bins.worst,
+            table,
+        }
+    }
 }
 
 fn fill(
@@ -61,6 +107,7 @@ fn fill(
     mesh: &VoxelMesh,
     grips: Planes,
     params: &SolveParams,
+    materials: &Materials,
 ) -> std::io::Result<()> {
     let axis = params.axis.index();
     let gauge_mm = (grips.high - grips.low) as f64 * mesh.grid.spacing_mm[axis];
@@ -77,13 +124,15 @@ fn fill(
         let [x, y, z] = mesh.position(node);
         writeln!(out, "{}, {x:.10}, {y:.10}, {z:.10}", node + 1)?;
     }
-    writeln!(out, "*ELEMENT, TYPE=C3D8, ELSET=BONE")?;
-    elements(out, mesh)?;
-    writeln!(
-        out,
-        "*MATERIAL, NAME=TISSUE\n*ELASTIC\n{}, {}\n*SOLID SECTION, ELSET=BONE, MATERIAL=TISSUE",
-        params.young_mpa, params.poisson
-    )?;
+    for (material, (young_mpa, poisson)) in materials.table.iter().enumerate() {
+        let name = 1 + material;
+        writeln!(out, "*ELEMENT, TYPE=C3D8, ELSET=BONE{name}")?;
+        elements(out, mesh, |element| materials.of[element] == material)?;
+        writeln!(
+            out,
+            "*MATERIAL, NAME=TISSUE{name}\n*ELASTIC\n{young_mpa}, {poisson}\n*SOLID SECTION, ELSET=BONE{name}, MATERIAL=TISSUE{name}"
+        )?;
+    }
     writeln!(out, "*NSET, NSET=HIGH")?;
     for node in nodes().filter(|&n| mesh.indices(n)[axis] as usize >= grips.high) {
         writeln!(out, "{},", node + 1)?;
@@ -98,7 +147,11 @@ fn fill(
     writeln!(out, "*NODE PRINT, NSET=HIGH, TOTALS=ONLY\nRF\n*END STEP")
 }
 
-fn elements(out: &mut impl Write, mesh: &VoxelMesh) -> std::io::Result<()> {
+fn elements(
+    out: &mut impl Write,
+    mesh: &VoxelMesh,
+    wanted: impl Fn(usize) -> bool,
+) -> std::io::Result<()> {
     let mut number = 0;
     for segment in &mesh.segments {
         for i in 0..segment.len {
@@ -106,6 +159,9 @@ fn elements(out: &mut impl Write, mesh: &VoxelMesh) -> std::io::Result<()> {
                 continue;
             }
             number += 1;
+            if !wanted(number - 1) {
+                continue;
+            }
             write!(out, "{number}")?;
             for [x, y, z] in CORNERS {
                 // Row (dy, dz) of neighbours, at this node's own x.

@@ -1,53 +1,100 @@
 //! Owns the export of a lattice as a LAMMPS data file (`atom_style bond`).
 //!
 //! At ν = ¼ a lattice is a plain spring network: per bond `U = (k_s/4) (elongation)²`, which is LAMMPS' harmonic bond
-//! `E = K (r − r0)²` with `K = k_s/4`. That is what is written, for E = 1000 MPa; mm, N and N mm, `units lj`.
+//! `E = K (r − r0)²` with `K = k_s/4`. Where sites differ, a bond has the mean of its ends' weights, and bonds of about one
+//! weight share a type. mm, N and N mm, `units lj`.
 
 use crate::error::{Error, Result};
 use crate::io::atomic;
+use crate::io::bins::Bins;
 use crate::physics::lattice::Moduli;
 use crate::topology::sites::Sites;
 use std::io::Write;
 use std::path::Path;
 
-const YOUNG_MPA: f64 = 1000.0;
-
-/// Atom types: 1 free, 2 in the low grip, 3 in the high grip. Bond types: 1 first shell, 2 second shell.
-///
-/// # Errors
-/// An unwritable file, or a graded lattice, whose bonds all differ.
-pub fn write(path: &Path, sites: &Sites) -> Result<()> {
-    if sites.weights.is_some() {
-        return Err(graded());
-    }
-    atomic::write_with(path, |out| fill(out, sites))
+/// What the bonds of a file are worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tissue {
+    /// Of a site of weight 1.
+    pub young_mpa: f64,
+    /// Different weights of bonds at most.
+    pub bins: usize,
 }
 
-/// Why a graded lattice is not written.
-pub fn graded() -> Error {
+/// Atom types: 1 free, 2 in the low grip, 3 in the high grip. Bond types: first shell, second shell, of each weight in
+/// ascending order. Returns by what share the bond farthest from its type's stiffness is off.
+///
+/// # Errors
+/// An unwritable file, a modulus that is none.
+pub fn write(path: &Path, sites: &Sites, tissue: Tissue) -> Result<f64> {
+    let frame = &sites.frame;
+    let moduli = Moduli::new(frame.structure, frame.lp_mm, tissue.young_mpa, 0.25)?;
+    let bonds = bonds(sites);
+    let weight = |s: u32| sites.weights.as_ref().map_or(1.0, |w| w[s as usize]);
+    let weights: Vec<f64> = bonds
+        .iter()
+        .map(|bond| 0.5 * (weight(bond.ends[0]) + weight(bond.ends[1])))
+        .collect();
+    let bins = Bins::of(&weights, tissue.bins.max(1));
+    atomic::write_with(path, |out| {
+        fill(out, sites, tissue.young_mpa, &moduli, &bonds, &bins)
+    })?;
+    Ok(bins.worst)
+}
+
+/// Why a lattice of pieces is not written.
+pub fn pieces() -> Error {
     Error::setting(
         "--export lammps",
-        "a graded lattice has a stiffness of its own on every bond",
-        "export firm or floppy lattices",
+        "a graded SC lattice joins pieces of bone at one point by springs of no length",
+        "export firm or floppy lattices, or BCC",
     )
 }
 
-fn fill(out: &mut impl Write, sites: &Sites) -> std::io::Result<()> {
+struct Bond {
+    shell: usize,
+    ends: [u32; 2],
+}
+
+/// Each bond once, at the site it leaves along its pair's direction.
+fn bonds(sites: &Sites) -> Vec<Bond> {
+    let first_shell = sites.frame.structure.stencil().first_shell_pairs;
+    let mut bonds = Vec::with_capacity(sites.bonds());
+    for s in 0..sites.len() {
+        for (p, ends) in sites.neighbours_of(s).chunks_exact(2).enumerate() {
+            if ends[0] as usize != s {
+                bonds.push(Bond {
+                    shell: usize::from(p >= first_shell),
+                    ends: [s as u32, ends[0]],
+                });
+            }
+        }
+    }
+    bonds
+}
+
+fn fill(
+    out: &mut impl Write,
+    sites: &Sites,
+    young_mpa: f64,
+    moduli: &Moduli,
+    bonds: &[Bond],
+    bins: &Bins,
+) -> std::io::Result<()> {
     let frame = &sites.frame;
     let stencil = frame.structure.stencil();
-    let moduli =
-        Moduli::new(frame.structure, frame.lp_mm, YOUNG_MPA, 0.25).expect("fixed, valid moduli");
     writeln!(
         out,
-        "# {} lattice, LP {} mm, E {YOUNG_MPA} MPa, nu 0.25; units lj (mm, N, N mm); atom_style bond\n",
+        "# {} lattice, LP {} mm, E {young_mpa} MPa, nu 0.25; units lj (mm, N, N mm); atom_style bond\n",
         frame.structure.name(),
         frame.lp_mm
     )?;
     writeln!(
         out,
-        "{} atoms\n{} bonds\n3 atom types\n2 bond types\n",
+        "{} atoms\n{} bonds\n3 atom types\n{} bond types\n",
         sites.len(),
-        sites.bonds()
+        bonds.len(),
+        2 * bins.values.len().max(1)
     )?;
     for (a, name) in ["x", "y", "z"].iter().enumerate() {
         let margin = (frame.rings[a] + 2) as f64 * frame.step_mm;
@@ -62,20 +109,14 @@ fn fill(out: &mut impl Write, sites: &Sites) -> std::io::Result<()> {
         out,
         "\nMasses\n\n1 1.0\n2 1.0\n3 1.0\n\nBond Coeffs # harmonic\n"
     )?;
-    for shell in 0..2 {
-        let pair = if shell == 0 {
-            0
-        } else {
-            stencil.first_shell_pairs
-        };
-        let squared: i32 = stencil.pairs[pair].iter().map(|c| c * c).sum();
-        let length = f64::from(squared).sqrt() * frame.step_mm;
-        writeln!(
-            out,
-            "{} {:.17e} {length:.17e}",
-            shell + 1,
-            0.25 * moduli.k[shell]
-        )?;
+    for (bin, weight) in bins.values.iter().enumerate() {
+        for (shell, pair) in [0, stencil.first_shell_pairs].into_iter().enumerate() {
+            let squared: i32 = stencil.pairs[pair].iter().map(|c| c * c).sum();
+            let length = f64::from(squared).sqrt() * frame.step_mm;
+            let stiffness = 0.25 * weight * moduli.k[shell];
+            let kind = 1 + 2 * bin + shell;
+            writeln!(out, "{kind} {stiffness:.17e} {length:.17e}")?;
+        }
     }
     writeln!(out, "\nAtoms # bond\n")?;
     for s in 0..sites.len() {
@@ -86,16 +127,10 @@ fn fill(out: &mut impl Write, sites: &Sites) -> std::io::Result<()> {
         writeln!(out, "{} 1 {kind} {x:.16} {y:.16} {z:.16}", s + 1)?;
     }
     writeln!(out, "\nBonds\n")?;
-    let mut bond = 0;
-    for s in 0..sites.len() {
-        for (p, ends) in sites.neighbours_of(s).chunks_exact(2).enumerate() {
-            // Each bond stands once, at the site it leaves along its pair's direction.
-            if ends[0] as usize != s {
-                bond += 1;
-                let shell = 1 + usize::from(p >= stencil.first_shell_pairs);
-                writeln!(out, "{bond} {shell} {} {}", s + 1, ends[0] + 1)?;
-            }
-        }
+    for (b, (bond, &bin)) in bonds.iter().zip(&bins.of).enumerate() {
+        let kind = 1 + 2 * bin as usize + bond.shell;
+        let [from, to] = bond.ends;
+        writeln!(out, "{} {kind} {} {}", b + 1, from + 1, to + 1)?;
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 pub mod aim;
 pub mod atomic;
+pub mod bins;
 pub mod bitmap;
 pub mod dicom;
 mod dicom_lengths;

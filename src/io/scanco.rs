@@ -5,15 +5,18 @@
 
 use crate::error::{Error, Result};
 use crate::stage::segment::GreyUnit;
+use serde::Serialize;
 use std::path::Path;
 
 /// Constants from an AIM's processing log or an ISQ's header; None where it does not hold them.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Calibration {
     pub mu_scaling: Option<f64>,
     /// 1/cm.
+    #[serde(rename = "mu_water_per_cm")]
     pub mu_water: Option<f64>,
     /// mg HA/cm³ per 1/cm, and mg HA/cm³.
+    #[serde(rename = "density_mgha_slope_intercept")]
     pub density: Option<[f64; 2]>,
 }
 

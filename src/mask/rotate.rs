@@ -179,6 +179,18 @@ mod tests {
 
     #[test]
     fn the_box_within_touches_the_old_faces_and_a_right_angle_loses_nothing() {
+        for direction in [[0.3, -0.5, 0.4], [-1.0, 2.0, -1e-9], [0.0, 0.0, -5.0]] {
+            let axes = shortest_turn(direction);
+            for (r, row) in axes.iter().enumerate() {
+                let dot = |other: &[f64; 3]| (0..3).map(|a| row[a] * other[a]).sum::<f64>();
+                let squares = axes.map(|other| dot(&other));
+                let unit = (0..3).all(|s| (squares[s] - f64::from(u8::from(r == s))).abs() < 1e-12);
+                assert!(unit, "{direction:?} {axes:?}");
+            }
+            let [x, y, z] = axes[2];
+            let [dx, dy, dz] = direction;
+            assert!((x * dy - y * dx).abs() + (y * dz - z * dy).abs() < 1e-12);
+        }
         let grid = Grid::new([40, 50, 60], [0.02; 3]);
         let quarter = Rotated::to_z(&grid, [1.0, 0.0, 0.0], 0.02, false);
         assert_eq!(quarter.grid.n, [60, 50, 40]);

@@ -2,6 +2,9 @@
 
 use crate::error::Result;
 use crate::io::scan;
+use crate::io::scanco::Calibration;
+use crate::mask::threshold;
+use crate::stage::segment::GreyUnit;
 use serde::Serialize;
 use std::path::Path;
 
@@ -21,6 +24,13 @@ pub struct ScanInfo {
     pub grey_mean: Option<f64>,
     /// Grey values below which 1, 25, 50, 75 and 99 % of the voxels lie.
     pub grey_percentiles: Vec<f32>,
+    /// Otsu's threshold of the values as they are, unsmoothed: a first guess, not a calibration.
+    pub otsu: Option<f64>,
+    /// Share of the voxels at or above it.
+    pub otsu_share: Option<f64>,
+    /// Values and their voxels where they are few: a labelled scan or a mask.
+    pub labels: Vec<(f32, u64)>,
+    pub calibration: Option<Calibration>,
     pub non_finite_voxels: u64,
     pub blake3: String,
     /// Further facts of the format. Names of persons are left out.
@@ -44,6 +54,9 @@ pub fn info(file: &Path) -> Result<ScanInfo> {
     sorted.sort_unstable_by(f32::total_cmp);
     let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
     let some = !sorted.is_empty();
+    let otsu = otsu(&sorted);
+    let above = |t: f64| sorted.len() - sorted.partition_point(|&v| f64::from(v) < t);
+    let otsu_share = otsu.map(|t| above(t) as f64 / sorted.len() as f64);
     let size = stored
         .spacing_mm
         .map(|s| std::array::from_fn(|a| s[a] * stored.n[a] as f64));
@@ -62,6 +75,10 @@ pub fn info(file: &Path) -> Result<ScanInfo> {
         } else {
             Vec::new()
         },
+        otsu,
+        otsu_share,
+        labels: labels(&sorted),
+        calibration: stored.calibration,
         non_finite_voxels: non_finite,
         blake3: scan::hash(file)?,
         details: stored.details,
@@ -78,6 +95,34 @@ pub fn info(file: &Path) -> Result<ScanInfo> {
     }
     info.lines = lines(&info);
     Ok(info)
+}
+
+/// None where there is one value only.
+fn otsu(sorted: &[f32]) -> Option<f64> {
+    let (min, max) = (*sorted.first()?, *sorted.last()?);
+    if min == max {
+        return None;
+    }
+    let counts = threshold::histogram(sorted, min, max);
+    threshold::otsu(&counts, f64::from(min), f64::from(max))
+}
+
+/// More different values than this are grey values.
+const MOST_LABELS: usize = 12;
+
+/// Whole numbers and how often they occur; empty where values are many or broken.
+fn labels(sorted: &[f32]) -> Vec<(f32, u64)> {
+    let mut found = Vec::new();
+    let mut rest = sorted;
+    while let Some(&value) = rest.first() {
+        if found.len() == MOST_LABELS || value.fract() != 0.0 {
+            return Vec::new();
+        }
+        let count = rest.partition_point(|&v| v <= value);
+        found.push((value, count as u64));
+        rest = &rest[count..];
+    }
+    found
 }
 
 fn lines(info: &ScanInfo) -> Vec<String> {
@@ -108,6 +153,7 @@ fn lines(info: &ScanInfo) -> Vec<String> {
             p[0], p[1], p[2], p[3], p[4]
         ));
     }
+    lines.extend(suggestion(info));
     if info.non_finite_voxels > 0 {
         lines.push(format!(
             "not finite   {} voxels (taken as pore)",
@@ -121,6 +167,49 @@ fn lines(info: &ScanInfo) -> Vec<String> {
             .map(|(key, value)| format!("{key:<12} {value}")),
     );
     lines.extend(info.notes.iter().map(|note| format!("note         {note}")));
+    lines
+}
+
+/// What to segment by: the labels of a labelled scan, or Otsu's threshold.
+fn suggestion(info: &ScanInfo) -> Vec<String> {
+    let voxels: usize = info.voxels.iter().product();
+    let percent = |count: f64| 100.0 * count / voxels.max(1) as f64;
+    let mut lines = Vec::new();
+    if !info.labels.is_empty() {
+        let words: Vec<String> = info
+            .labels
+            .iter()
+            .map(|&(value, count)| format!("{value}: {:.2} %", percent(count as f64)))
+            .collect();
+        lines.push(format!("labels       {}", words.join(", ")));
+        let bone: Vec<String> = info
+            .labels
+            .iter()
+            .filter(|l| l.0 > 0.0)
+            .map(|l| l.0.to_string())
+            .collect();
+        if !bone.is_empty() && info.labels.len() > 1 {
+            lines.push(format!("suggestion   segment --labels {}", bone.join(",")));
+        }
+        return lines;
+    }
+    let (Some(t), Some(share)) = (info.otsu, info.otsu_share) else {
+        return lines;
+    };
+    let mut line = format!(
+        "Otsu         {}, {:.1} % of the voxels lie above",
+        short(t),
+        100.0 * share
+    );
+    if let Some(calibration) = info.calibration {
+        for unit in [GreyUnit::Hu, GreyUnit::Mgha] {
+            if let Ok(([slope, intercept], name)) = calibration.line(unit, Path::new("")) {
+                line += &format!("; {} {name}", short(slope * t + intercept));
+            }
+        }
+    }
+    lines.push(line);
+    lines.push("suggestion   segment --otsu, or --lower with the threshold of your protocol; look at segment.png".into());
     lines
 }
 

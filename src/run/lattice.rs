@@ -2,22 +2,34 @@
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
-use crate::io::{atomic, lammps, vtk};
+use crate::io::{atomic, lammps, specimen, vtk};
 use crate::run::segment::load;
 use crate::run::session::Session;
 use crate::stage::lattice::{
-    Case, LatticeParams, LatticeSummary, build, build_pieces, summarise, summarise_pieces,
+    Case, LatticeParams, LatticeSummary, build, build_of, build_pieces, summarise, summarise_pieces,
 };
+use crate::stage::solve::SolveParams;
+use crate::stage::solve::tissue::Tissue;
 use crate::topology::pieces::Pieces;
 use crate::topology::sites::Sites;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A format for other programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Export {
     Lammps,
     Vtk,
+}
+
+/// What is written for other programs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exports {
+    pub formats: Vec<Export>,
+    /// Young's modulus and, for LAMMPS, the law of moduli that differ.
+    pub tissue: SolveParams,
+    /// Different stiffnesses in one file at most.
+    pub bins: usize,
 }
 
 /// `lattice.json`: the settings `solve` finds there, and what they came to (nothing where `run` went straight on to the
@@ -36,26 +48,56 @@ const RECORD: &str = "lattice.json";
 pub fn lattice(
     dir: &Path,
     params: &LatticeParams,
-    exports: &[Export],
+    exports: &Exports,
     session: &Session,
 ) -> Result<Vec<LatticeSummary>> {
     params.check()?;
-    let specimen = load(dir)?;
-    if specimen.grey.is_some() && !exports.is_empty() {
+    exports.tissue.check()?;
+    let mut specimen = load(dir)?;
+    let factors = match exports.tissue.material {
+        None => None,
+        Some(_) => {
+            specimen.grey = specimen::load_grey(dir, &specimen.bone)?;
+            match Tissue::of(&specimen, &exports.tissue)? {
+                Tissue::Uniform(solid) => Some((solid.young_mpa, None)),
+                Tissue::Mixed(mixed) => Some((mixed.mean_mpa, Some(mixed.factor))),
+            }
+        }
+    };
+    let (young_mpa, factors) = factors.unwrap_or((exports.tissue.young_mpa, None));
+    let written = Written {
+        dir,
+        formats: if session.dry_run {
+            &[]
+        } else {
+            &exports.formats
+        },
+        tissue: lammps::Tissue {
+            young_mpa,
+            bins: exports.bins,
+        },
+        session,
+    };
+    if factors.is_none() && dir.join(specimen::GREY).exists() && !exports.formats.is_empty() {
         session.warn(
-            "the folder keeps grey values, but exported lattices are of one tissue: laws of moduli are `solve`'s",
+            "the folder keeps grey values, but the exported lattices are of one tissue: give --material for moduli that follow them",
         );
     }
     let mut lattices = Vec::new();
     for case in params.cases() {
-        let exports = if session.dry_run { &[] } else { exports };
         let summary = if case.in_pieces() {
             let pieces = build_pieces(&specimen, &case, Axis::Z, 0.0)?;
-            export(dir, &case, exports, Err(&pieces))?;
+            written.pieces(&case, &pieces)?;
             summarise_pieces(&specimen, &case, &pieces)
         } else {
             let sites = build(&specimen, &case, Axis::Z, 0.0)?;
-            export(dir, &case, exports, Ok(&sites))?;
+            match &factors {
+                None => written.sites(&case, &sites)?,
+                Some(factors) => {
+                    let mixed = build_of(&specimen, Some(factors), &case, Axis::Z, 0.0)?;
+                    written.sites(&case, &mixed)?;
+                }
+            }
             summarise(&specimen, &case, &sites)
         };
         session.say(summary.in_words());
@@ -84,35 +126,59 @@ fn write(dir: &Path, params: &LatticeParams, lattices: Vec<LatticeSummary>) -> R
     atomic::write(&dir.join(RECORD), text)
 }
 
-/// Writes sites, or the pieces of a graded lattice.
-fn export(
-    dir: &Path,
-    case: &Case,
-    exports: &[Export],
-    lattice: std::result::Result<&Sites, &Pieces>,
-) -> Result<()> {
-    let name = format!(
-        "lattice-{}-{}-{}",
-        case.structure.name(),
-        case.boundary.name(),
-        case.lp_mm
-    );
-    for format in exports {
-        match format {
-            Export::Lammps => match lattice {
-                Ok(sites) => lammps::write(&dir.join(format!("{name}.data")), sites)?,
-                Err(_) => return Err(lammps::graded()),
-            },
-            Export::Vtk => {
-                let path = dir.join(format!("{name}.vtk"));
-                match lattice {
-                    Ok(sites) => vtk::write_lattice(&path, sites)?,
-                    Err(pieces) => vtk::write_pieces(&path, pieces)?,
+/// Where exported lattices go.
+struct Written<'a> {
+    dir: &'a Path,
+    formats: &'a [Export],
+    tissue: lammps::Tissue,
+    session: &'a Session,
+}
+
+impl Written<'_> {
+    fn path(&self, case: &Case, extension: &str) -> PathBuf {
+        self.dir.join(format!(
+            "lattice-{}-{}-{}.{extension}",
+            case.structure.name(),
+            case.boundary.name(),
+            case.lp_mm
+        ))
+    }
+
+    fn sites(&self, case: &Case, sites: &Sites) -> Result<()> {
+        for format in self.formats {
+            match format {
+                Export::Vtk => vtk::write_lattice(&self.path(case, "vtk"), sites)?,
+                Export::Lammps => {
+                    let path = self.path(case, "data");
+                    let worst = lammps::write(&path, sites, self.tissue)?;
+                    self.session.say(binned(&path, worst));
                 }
             }
         }
+        Ok(())
     }
-    Ok(())
+
+    fn pieces(&self, case: &Case, pieces: &Pieces) -> Result<()> {
+        for format in self.formats {
+            match format {
+                Export::Vtk => vtk::write_pieces(&self.path(case, "vtk"), pieces)?,
+                Export::Lammps => return Err(lammps::pieces()),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What was written, and how far its stiffnesses are rounded.
+pub(super) fn binned(path: &Path, worst: f64) -> String {
+    let rounded = match worst > 0.0 {
+        true => format!(
+            ": stiffnesses are rounded to those of their bins, by {:.2} % at most (--bins)",
+            100.0 * worst
+        ),
+        false => String::new(),
+    };
+    format!("wrote {}{rounded}", path.display())
 }
 
 /// The settings that `lattice` left in `dir`; the defaults where it was not run.

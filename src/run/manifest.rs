@@ -96,7 +96,9 @@ fn job<'a>(
     let mut segment = params.clone();
     let (lower, upper) = (number("lower")?, number("upper")?);
     if lower.is_some() || upper.is_some() {
-        (segment.lower, segment.upper, segment.otsu) = (lower, upper, false);
+        segment.lower = lower.or(segment.lower);
+        segment.upper = upper.or(segment.upper);
+        segment.otsu = false;
     }
     match cell("otsu") {
         Some("true" | "TRUE" | "1" | "yes") => {
@@ -127,6 +129,7 @@ mod tests {
         std::fs::write(&path, text).unwrap();
         let params = SegmentParams {
             lower: Some(5.0),
+            upper: Some(2000.0),
             ..SegmentParams::default()
         };
         let jobs = read(&path, &params)?;
@@ -156,6 +159,18 @@ mod tests {
         assert_eq!(
             (jobs[0].segment.spacing_mm, jobs[1].segment.spacing_mm),
             (Some([0.02; 3]), None)
+        );
+    }
+
+    #[test]
+    fn an_empty_cell_leaves_the_recipes_window() {
+        let jobs = read_text("path,lower,upper\na.nii,,900\nb.nii,7,NA\n").unwrap();
+        let windows = jobs
+            .iter()
+            .map(|job| (job.segment.lower, job.segment.upper));
+        assert_eq!(
+            windows.collect::<Vec<_>>(),
+            [(Some(5.0), Some(900.0)), (Some(7.0), Some(2000.0))]
         );
     }
 

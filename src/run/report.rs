@@ -1,6 +1,7 @@
 //! Owns `report` on disk: rows of any number of solved scans in; tables, plots and pages out.
 
 use crate::error::{Error, Result};
+use crate::grid::Axis;
 use crate::io::html::{self, ScanPage, Source};
 use crate::io::specimen::{self, SegmentRecord};
 use crate::io::{atomic, markdown, plot, table};
@@ -194,6 +195,22 @@ fn facts(record: &SegmentRecord) -> Vec<(String, String)> {
             results.removed_voxels.to_string(),
         ),
     ];
+    if record.settings.turn != Axis::Z {
+        let turned = format!("its {} axis is now z", record.settings.turn.name());
+        facts.push(("turned", turned));
+    }
+    if let Some(r) = results.rotation {
+        let [x, y, z] = r.direction;
+        let words = format!(
+            "by {:.1}°, ({x:.3}, {y:.3}, {z:.3}) is now z; a box of {:.0} % of the volume",
+            r.angle_deg,
+            100.0 * r.kept
+        );
+        facts.push(("rotated", words));
+    }
+    if let Some([low, high]) = results.plane_cut_mm {
+        facts.push(("ends cut flat (mm)", format!("{low:.3} and {high:.3}")));
+    }
     if let Some(t) = results.mean_thickness_mm {
         facts.push(("mean strut thickness (mm)", format!("{t:.3}")));
     }

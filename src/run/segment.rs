@@ -133,8 +133,10 @@ fn say(record: &SegmentRecord, session: &Session) {
     if let Some(turn) = &r.rotation {
         let [x, y, z] = turn.direction;
         session.say(format!(
-            "{}: turned by {:.1}°: ({x:.3}, {y:.3}, {z:.3}) of the scan is now z",
-            record.scan, turn.angle_deg
+            "{}: turned by {:.1}°: ({x:.3}, {y:.3}, {z:.3}) of the scan is now z; a box of {:.0} % of its volume",
+            record.scan,
+            turn.angle_deg,
+            100.0 * turn.kept
         ));
     }
     if let Some([low, high]) = r.plane_cut_mm {

@@ -6,6 +6,7 @@ use crate::measure::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapol
 use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
 use crate::measure::thickness::plate_thickness_mm;
+use crate::run::lattice::binned;
 use crate::run::meter::Meter;
 use crate::run::results::Results;
 use crate::run::segment::load;
@@ -34,10 +35,7 @@ pub fn solve(
 ) -> Result<Vec<Row>> {
     lattices.check()?;
     params.check()?;
-    let mut specimen = load(dir)?;
-    if params.material.is_some() {
-        specimen.grey = specimen::load_grey(dir, &specimen.bone)?;
-    }
+    let specimen = loaded(dir, params)?;
     let tissue = Tissue::of(&specimen, params)?;
     let settings = tissue.label(params.row(&specimen), params);
     drop(tissue);
@@ -84,19 +82,29 @@ pub fn solve(
     Ok(all)
 }
 
-/// Writes the voxel elements of the specimen in `dir`, with material, supports and load, to `dir/voxel-fe.inp`.
+/// With grey values where the material asks for them.
+fn loaded(dir: &Path, params: &SolveParams) -> Result<Specimen> {
+    let mut specimen = load(dir)?;
+    if params.material.is_some() {
+        specimen.grey = specimen::load_grey(dir, &specimen.bone)?;
+    }
+    Ok(specimen)
+}
+
+/// Writes the voxel elements of the specimen in `dir`, with materials (at most `bins` moduli), supports and load, to
+/// `dir/voxel-fe.inp`.
 ///
 /// # Errors
 /// A method or load without such a model, an unwritable file.
-pub fn export_inp(dir: &Path, params: &SolveParams, session: &Session) -> Result<()> {
+pub fn export_inp(dir: &Path, params: &SolveParams, bins: usize, session: &Session) -> Result<()> {
     params.check()?;
     let path = dir.join("voxel-fe.inp");
     if session.dry_run {
         session.say(format!("would write {}", path.display()));
         return Ok(());
     }
-    inp::write(&path, &load(dir)?, params)?;
-    session.say(format!("wrote {}", path.display()));
+    let worst = inp::write(&path, &loaded(dir, params)?, params, bins)?;
+    session.say(binned(&path, worst));
     Ok(())
 }
 

@@ -76,6 +76,12 @@ LOADS = [
 ]
 
 
+# Tissue that differs: value 2 in every third voxel, and one modulus per coarsened element.
+MIXED = [
+    ["--material", "labels:1=800/0.3,2=2500/0.2"],
+    ["--material", "linear:300,500", "--axis", "y", "--ends", "bonded"],
+    ["--coarsen", "2", "--bins", "1000"],
+]
 STACK = ROOT.parent / "shared/data/lhdl_3155_D_4_bc"
 CROP = ["--spacing", "0.0195", "--gaussian", "1", "--lower", "63", "--crop", "60:96,60:96,80:116"]
 
@@ -122,6 +128,12 @@ def main():
             nifti(scan, n, spacing, bone)
             subprocess.run([PROGRAM, "segment", scan, "-o", base, "--lower", "1", "--quiet"], check=True)
             worst = max([worst, *(compare(base, name, flags) for flags in LOADS)])
+        n, spacing, bone = SPECIMENS["plates"]
+        base = pathlib.Path(temporary) / "mixed"
+        nifti(base.with_suffix(".nii"), n, spacing, lambda x, y, z: bone(x, y, z) * (1 + (x + 2 * y + z) % 3 // 2))
+        words = [PROGRAM, "segment", base.with_suffix(".nii"), "-o", base, "--labels", "1,2", "--quiet"]
+        subprocess.run(words, check=True)
+        worst = max([worst, *(compare(base, "mixed tissue", flags) for flags in MIXED)])
         if STACK.is_dir():
             base = pathlib.Path(temporary) / "stack"
             subprocess.run([PROGRAM, "segment", STACK, "-o", base, "--quiet", *CROP], check=True)

@@ -78,13 +78,23 @@ def main():
         return 0
     scan = sys.argv[1] if len(sys.argv) > 1 else ROOT / "sample_data/trabecular.nii.gz"
     flags = sys.argv[2:] or ["--lower", "200", "--upper", "5600"]
+    # Moduli by grey value, in more bins than matter: the stiffness of every bond is rounded by 0.05 % at most.
+    mixed = ["--material", "linear:0.4,200", "--least-mpa", "100"]
+    worst = max(compare(scan, flags, [], []), compare(scan, [*flags, "--keep-grey"], mixed, ["--bins", "4000"]))
+    passed = worst <= TOLERANCE
+    print(f"{'passed' if passed else 'FAILED'}: largest difference {100 * worst:.4f} % (allowed 0.1 %)")
+    return 0 if passed else 1
+
+
+def compare(scan, flags, tissue, bins):
+    """The largest relative difference of energies, over structures and boundaries."""
     worst = 0.0
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         run(PROGRAM, "segment", scan, "-o", folder, *flags)
         which = ["--structure", "sc,bcc,fcc", "--lp", "0.08", "--boundary", "firm,floppy"]
-        run(PROGRAM, "lattice", folder, *which, "--export", "lammps")
-        run(PROGRAM, "solve", folder, "--poisson", "0.25", f"--strain={STRAIN}", "--tolerance", "1e-6")
+        run(PROGRAM, "lattice", folder, *which, "--export", "lammps", *tissue, *bins)
+        run(PROGRAM, "solve", folder, "--poisson", "0.25", f"--strain={STRAIN}", "--tolerance", "1e-6", *tissue)
         for row in csv.DictReader((folder / "results.csv").open()):
             if row["boundary"] == "ffb":
                 continue
@@ -98,9 +108,7 @@ def main():
             print(f"{row['structure']} {row['boundary']:7} {row['sites']:>7} sites  energy here {ours:.6e}  "
                   f"LAMMPS {theirs:.6e} N mm  difference {100 * off:+.4f} %  "
                   f"time here {float(row['wall_s']):.3f} s  LAMMPS {wall:.3f} s")
-    passed = worst <= TOLERANCE
-    print(f"{'passed' if passed else 'FAILED'}: largest difference {100 * worst:.4f} % (allowed 0.1 %)")
-    return 0 if passed else 1
+    return worst
 
 
 def length_mm(folder):

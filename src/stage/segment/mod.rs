@@ -178,7 +178,7 @@ fn cut(
     let mask = placed.voi_mask.take();
     placed.voi_mask = mask.map(|mask| Cow::Owned(mask.cropped(&keep)));
     let (components, removed) = join(&mut found.bone, params.keep_all).ok_or_else(nothing)?;
-    found.components = components;
+    found.components += components - 1;
     found.removed += removed;
     Ok([first, n[2] - end].map(|slices| slices as f64 * spacing_mm[2]))
 }

@@ -69,7 +69,7 @@ pub struct SegmentParams {
     pub otsu: bool,
     /// Of a labelled scan: the values that are bone, instead of a window.
     pub labels: Vec<i32>,
-    /// σ of a Gaussian in voxels; 0 is off.
+    /// σ of a Gaussian in voxels (of the resampled scan); 0 is off.
     pub gaussian_voxels: f64,
     pub voi: Voi,
     /// First and past-the-last voxel along x, y, z.

@@ -20,6 +20,8 @@ pub struct Rotation {
     pub direction: [f64; 3],
     /// By how much.
     pub angle_deg: f64,
+    /// Volume of the box over that of the scan's before.
+    pub kept: f64,
     /// Of a fabric: its longest mean intercept length over the next.
     pub mil_ratio: Option<f64>,
 }
@@ -117,6 +119,7 @@ impl Placed<'_> {
         self.rotation = Some(Rotation {
             direction: z,
             angle_deg: z[2].clamp(-1.0, 1.0).acos().to_degrees(),
+            kept: rotated.grid.size_mm().iter().product::<f64>() / volume,
             mil_ratio,
         });
         Ok(())

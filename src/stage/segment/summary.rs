@@ -22,7 +22,7 @@ pub struct SegmentSummary {
     /// Voxels in the window, before the volume of interest and connectivity.
     pub selected_voxels: u64,
     pub outside_voi_voxels: u64,
-    /// 6-connected components inside the volume of interest (after a plane cut, of what it left).
+    /// 6-connected components inside the volume of interest.
     pub components: u64,
     /// Voxels of all but the largest component; 0 with `keep_all`.
     pub removed_voxels: u64,

@@ -72,6 +72,8 @@ fn shares(fine: usize, coarse: usize) -> Vec<Vec<(usize, f32)>> {
                     let covered = high.min(f as f64 + 1.0) - low.max(f as f64);
                     (f, (covered / ratio) as f32)
                 })
+                // Rounding can leave nothing of the first.
+                .skip_while(|s| s.1 <= 1e-6)
                 .take_while(|s| s.1 > 1e-6)
                 .collect()
         })
@@ -85,6 +87,19 @@ mod tests {
     fn sample() -> Volume<u8> {
         let grid = Grid::new([7, 6, 5], [0.01, 0.02, 0.03]);
         Volume::from_vec(grid, (0..210).map(|i| u8::from(i * i % 7 < 3)).collect())
+    }
+
+    #[test]
+    fn solid_bone_stays_solid_at_any_size() {
+        for n in 1..150 {
+            for factor in 1..12 {
+                let parts = shares(n, n.div_ceil(factor));
+                let whole = |part: &Vec<(usize, f32)>| {
+                    (part.iter().map(|s| s.1).sum::<f32>() - 1.0).abs() < 1e-5
+                };
+                assert!(parts.iter().all(whole), "{n} {factor}");
+            }
+        }
     }
 
     #[test]

@@ -35,7 +35,7 @@ fn a_threshold_between_marrow_and_bone_is_suggested() {
     assert_eq!(json["size_mm"][2], 0.4);
     for part in [
         "Otsu",
-        "25 % of the voxels",
+        "25.0 % of the voxels",
         "segment --otsu",
         "0.03 × 0.03 × 0.04 mm",
     ] {

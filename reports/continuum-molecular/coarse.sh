@@ -18,6 +18,7 @@ for angle in 0 45 60 90; do
         -e 's/times = \[0.2\]/times = [0.2, 0.3]/; s/\[-6.3, 0.45\], \[-6.3, -0.45\]/[-6.15, 0.9], [-6.15, -0.9]/'
 done
 for material in silicon anisotropic; do
-    scene crack-kinking-$material -e 's/spacing = 0.0166*/spacing = 0.025/; s/0\.908/0.8625/' \
-        -e 's/tip = \[0, 0\]/tip = [0, 0]\nwindow_points = 500/'
+    sed -e 's/spacing = 0.0166*/spacing = 0.025/; s/0\.908/0.8625/; s/tip = \[0, 0\]/tip = [0, 0]\nwindow_points = 500/' \
+        "$here/scene-crack-kinking-$material.toml" > "$runs/crack-kinking-$material-40.toml"
+    bonepd-ct scene "$runs/crack-kinking-$material-40.toml" -o "$runs/crack-kinking-$material-40"
 done

@@ -102,14 +102,16 @@ def kinking():
     figure, axes = plt.subplots(1, 2, figsize=(7.4, 3.2), sharey=True)
     for axis, (material, angles) in zip(axes, criterion.items()):
         axis.plot(range(0, 91, 10), [-a for a in angles], color=HUES[2], lw=1, label="maximum hoop stress")
-        path = RUNS / f"crack-kinking-{material}" / "scene.json"
-        if path.exists():
+        for k, (grid, folder) in enumerate((("a/60", ""), ("a/40", "-40"))):
+            path = RUNS / f"crack-kinking-{material}{folder}" / "scene.json"
+            if not path.exists():
+                print(f"left out: {path} is missing")
+                continue
             numbers = dict(json.load(open(path))["numbers"])
-            for k, name in enumerate(("end_direction_deg",)):
-                found = {float(key.split("_at_")[1]): -v for key, v in numbers.items() if key.startswith(name)}
-                axis.plot(found.keys(), found.values(), MARKS[k], color=HUES[k], ms=5, label="computed")
-                rest = [abs(found[a] + angles[int(a / 10)]) for a in found]
-                print(f"{material}, {name}: mean deviation {sum(rest) / len(rest):.2f} degrees, largest {max(rest):.2f}")
+            found = {float(key.split("_at_")[1]): -v for key, v in numbers.items() if key.startswith("end_direction_deg")}
+            axis.plot(found.keys(), found.values(), MARKS[k], color=HUES[k], ms=5, label=f"computed, {grid}")
+            rest = [abs(found[a] + angles[int(a / 10)]) for a in found]
+            print(f"{material}, {grid}: mean deviation {sum(rest) / len(rest):.2f} degrees, largest {max(rest):.2f}")
         axis.set_title({"silicon": "silicon <100>", "anisotropic": "fully anisotropic"}[material], fontsize=9)
         axis.set_xlabel("mixity (degrees)")
     axes[0].set_ylabel("kink (degrees)")
@@ -135,6 +137,7 @@ maps("heat-disc", ["heat-disc/temperature_t1.png"])
 maps("crack-tip", ["crack-tip-I/stress_yy_t1.png"])
 maps("plate", [f"notched-plate/damage_t{t}.png" for t in ("0.4", "0.8", "1.2")])
 maps("inclusion", ["square-inclusion/damage_t0.02.png"])
+maps("plate-modes", [f"plate-modes/magnitude_t{t}.png" for t in (4, 5, 7, 8)])
 maps("tetrachiral", [f"tetrachiral-modes/magnitude_t{t}.png" for t in (4, 5, 7)])
 maps("compact-tension", [f"compact-tension-{z}/damage_t0.4.png" for z in (0, 45, 60, 90)])
 energy_angle()

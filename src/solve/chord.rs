@@ -15,8 +15,9 @@ pub struct Chord {
     order: Vec<usize>,
     factor: Factor,
     ready: bool,
-    /// Iterations since the factor was made.
+    /// Iterations since the factor was made, and the unknowns it was made at.
     age: usize,
+    made_at: Vec<f64>,
     pub tolerance: f64,
     pub max_iterations: usize,
 }
@@ -44,8 +45,6 @@ const PATIENCE: usize = 10;
 const WORTH: usize = 50;
 /// An error this many times that before calls for a new factor at once.
 const DIVERGING: f64 = 3.0;
-/// No accelerated update takes more than this share of a local unknown.
-const LOSS: f64 = 0.7;
 
 impl Chord {
     /// `pattern` and `order` are those of the unknowns that are not local.
@@ -61,9 +60,37 @@ impl Chord {
             order,
             ready: false,
             age: 0,
+            made_at: Vec::new(),
             tolerance,
             max_iterations,
         })
+    }
+
+    /// What it takes to make the factor in use again: the unknowns it was made at, its age and its kind.
+    pub fn factor_in_use(&self) -> Option<(&[f64], [f64; 2])> {
+        let kind = match self.factor {
+            Factor::Single(_) => 0.0,
+            Factor::Double(_) => 1.0,
+            Factor::Indefinite(_) => 2.0,
+        };
+        self.ready
+            .then_some((self.made_at.as_slice(), [self.age as f64, kind]))
+    }
+
+    /// Makes the factor again that [`Chord::factor_in_use`] described, of the equations it belonged to.
+    pub fn remake(
+        &mut self,
+        equations: &impl Staggered,
+        q: &[f64],
+        [age, kind]: [f64; 2],
+    ) -> Result<(), NotConverged> {
+        for _ in 0..kind as usize {
+            let next = self.factor.next(&self.stiffness, &self.order);
+            self.factor = next.ok_or(NotConverged::Singular)?;
+        }
+        self.renew(equations, q)?;
+        self.age = age as usize;
+        Ok(())
     }
 
     /// Solves from the guess `q`, in place.
@@ -102,8 +129,8 @@ impl Chord {
             let (update, share) = self.update(equations, q, &mut r, &diagonal);
             cut = share < 1.0;
             let next = anderson.next(q, &update, local);
-            let admissible = (0..local).all(|k| next[k] > (1.0 - LOSS) * q[k]);
-            if admissible {
+            let change: Vec<f64> = next.iter().zip(&*q).map(|(n, q)| n - q).collect();
+            if equations.share(q, &change) == 1.0 {
                 q.copy_from_slice(&next);
             } else {
                 anderson.restart();
@@ -120,25 +147,28 @@ impl Chord {
         !self.ready || (self.age >= WORTH && slow) || (self.age >= PATIENCE && grows)
     }
 
-    /// The response of the unknowns that are not local to the residual `r`, at `q`, in place; local ones stay.
+    /// The response of the unknowns that are not local to the residual `r`, at `q`, in place; local ones stay. True if
+    /// it took a new factor.
     pub fn respond(
         &mut self,
         equations: &impl Staggered,
         q: &[f64],
         r: &mut [f64],
-    ) -> Result<(), NotConverged> {
-        if !self.ready {
+    ) -> Result<bool, NotConverged> {
+        let renewed = !self.ready;
+        if renewed {
             self.renew(equations, q)?;
         }
         let (local, placements) = r.split_at_mut(equations.local());
         local.fill(0.0);
         self.factor.solve(placements);
-        Ok(())
+        Ok(renewed)
     }
 
     fn renew(&mut self, equations: &impl Staggered, q: &[f64]) -> Result<(), NotConverged> {
         equations.stiffness(q, &mut self.stiffness);
         self.age = 0;
+        self.made_at = q.to_vec();
         self.ready = false;
         while self.factor.factorize(&self.stiffness).is_err() {
             let next = self.factor.next(&self.stiffness, &self.order);
@@ -148,8 +178,7 @@ impl Chord {
         Ok(())
     }
 
-    /// Local unknowns first, then the others with the residual those leave; and the share of the former that is
-    /// admissible.
+    /// Local unknowns first, then the others with the residual those leave; and the share of both that is admissible.
     fn update(
         &mut self,
         equations: &impl Staggered,
@@ -171,7 +200,11 @@ impl Chord {
         }
         dq[local..].copy_from_slice(&r[local..]);
         self.factor.solve(&mut dq[local..]);
-        (dq, share)
+        let whole = equations.share(q, &dq);
+        if whole < 1.0 {
+            dq.iter_mut().for_each(|dq| *dq *= whole);
+        }
+        (dq, share * whole)
     }
 }
 

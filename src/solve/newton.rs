@@ -28,8 +28,8 @@ pub enum NotConverged {
     Diverged { error: f64 },
     /// The last update had to be cut to stay admissible, or left no number.
     #[error(
-        "a density would go negative: bone is resorbed faster than its load sustains (set \
-         growth.least, raise the load, lower growth.stimulus, or end sooner)"
+        "a density would go negative or an element turn inside out: bone is resorbed faster than its load sustains (set \
+         growth.least, raise the load, lower growth.stimulus, or end sooner), or the load changes too much at once"
     )]
     Vanishing,
     #[error("the tangent is singular or not positive definite")]

@@ -7,8 +7,10 @@ pub mod conditions;
 pub mod continuum;
 pub mod density;
 pub mod frame;
+mod loads;
 mod march;
 pub mod solver;
+pub mod state;
 mod stride;
 
 use crate::error::{Error, Result};

@@ -6,15 +6,15 @@
 //! while the body moves to its new equilibrium at constant load are counted separately and must balance.
 
 mod report;
+mod start;
 mod watch;
 
 use super::crack::Crack;
-use super::setup::{DISPLACEMENT, Setup, Solid};
+use super::setup::{Setup, Solid};
 use super::window::{Window, WindowBond, opposite};
 use super::{Fracture, Molecular};
 use crate::error::{Error, Result};
 use crate::physics::anisotropic::body::{Body, RESIDUAL};
-use crate::physics::anisotropic::toughness::critical_energy;
 use crate::stage::scene::Scene;
 use crate::stage::scene::frame::{Observer, Summary};
 use rayon::prelude::*;
@@ -94,7 +94,7 @@ pub fn run<const D: usize>(
             "take one of them out; batch is a share",
         ));
     }
-    solid.held = unit_load(scene, model, setup, &solid, time.end)?;
+    solid.held = start::unit_load(scene, model, setup, &solid, time.end)?;
     observer.start(&setup.points, (time.end / time.step).round() as usize)?;
     let mut front = Front::new(scene, model, params, solid, setup)?;
     let steps = (time.end / time.step).round().max(1.0) as usize;
@@ -109,109 +109,7 @@ pub fn run<const D: usize>(
     Ok(front.summary(steps))
 }
 
-/// What is held at load one. Refuses holds that do not grow in proportion to time.
-fn unit_load<const D: usize>(
-    scene: &Scene,
-    model: &Molecular,
-    setup: &Setup,
-    solid: &Solid<D>,
-    end: f64,
-) -> Result<Vec<Option<f64>>> {
-    let mut without = model.clone();
-    without.known.clear();
-    let names: [&[&str]; D] = std::array::from_fn(|d| DISPLACEMENT[d]);
-    let full = setup.held(scene, &without, names, end, None)?;
-    let half = setup.held(scene, &without, names, 0.5 * end, None)?;
-    let proportional = |(a, b): (&Option<f64>, &Option<f64>)| match (a, b) {
-        (Some(a), Some(b)) => (b - 0.5 * a).abs() <= 1e-9 * a.abs(),
-        _ => true,
-    };
-    if !full.iter().zip(&half).all(proportional)
-        || !scene.load.iter().all(|l| is_electric(&l.component))
-    {
-        return Err(Error::setting(
-            "hold.value",
-            "fracture follows displacements that grow in proportion to time, found another load",
-            "use value = { times = [0, end], values = [0, largest] }, or 0",
-        ));
-    }
-    let known = |v: usize| full[v].map(|f| f / end).or(solid.held[v]);
-    Ok((0..full.len()).map(known).collect())
-}
-
-fn is_electric(component: &str) -> bool {
-    component == "potential" || component == "temperature"
-}
-
-impl<'a, const D: usize> Front<'a, D> {
-    fn new(
-        scene: &'a Scene,
-        model: &'a Molecular,
-        params: &'a Fracture,
-        solid: Solid<D>,
-        setup: &'a Setup,
-    ) -> Result<Self> {
-        let angle = model
-            .elasticity
-            .as_ref()
-            .map_or(0.0, |e| e.angle_deg)
-            .to_radians();
-        let law = critical_energy(
-            params.energy[0],
-            params.energy[1],
-            setup.horizon(),
-            params.exponent,
-            params.frequency,
-            angle,
-        )?;
-        let n = setup.points.len();
-        let mut sound: Vec<bool> = (0..n)
-            .map(|p| (0..D).any(|d| solid.held[p * D + d].is_some()))
-            .collect();
-        for region in &params.unbreakable {
-            let chosen = region.select(&setup.points, n, "fracture.unbreakable")?;
-            chosen.into_iter().for_each(|p| sound[p] = true);
-        }
-        let mut stop = vec![false; n];
-        if let Some(region) = &params.stop {
-            let chosen = region.select(&setup.points, n, "fracture.stop")?;
-            chosen.into_iter().for_each(|p| stop[p] = true);
-        }
-        let conductor = match &model.conduction {
-            Some(conduction) => Some(setup.conductor(model, conduction)?.0),
-            None => None,
-        };
-        let (window, x) = Window::new(&solid.body, setup, &solid.held, &[])?;
-        let mut front = Front {
-            critical: setup.bonds.iter().map(|b| law.at(b.psi())).collect(),
-            broken: vec![false; setup.family.len()],
-            scene,
-            model,
-            params,
-            setup,
-            solid,
-            sound,
-            crack: Crack::new(params.tip, stop),
-            conductor,
-            window,
-            bonds: Vec::new(),
-            x,
-            far: 0.0,
-            stale: false,
-            lambda: 0.0,
-            recorded: 0.0,
-            ledger: Ledger::default(),
-            peak: 0.0,
-            worst_balance: 0.0,
-            solves: 0,
-            iterations: 0,
-            windows: 0,
-            potential_drop: 0.0,
-        };
-        front.move_window()?;
-        Ok(front)
-    }
-
+impl<const D: usize> Front<'_, D> {
     /// Raises the load to `target`, breaking bonds on the way.
     fn load_to(&mut self, target: f64, observer: &mut dyn Observer) -> Result<()> {
         let mut events = 0;

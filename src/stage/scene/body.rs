@@ -1,9 +1,11 @@
 //! Owns the set-up that all displacement models of a scene share: which values are unknown, which follow, which are
 //! given at a time, and the guess a step starts from.
 
+mod given;
+
 use crate::error::{Error, Result};
 use crate::operator::reduction::{Reduction, Value};
-use crate::stage::scene::conditions::{Hold, Lateral, LayerDensity, Layers, Normal};
+use crate::stage::scene::conditions::{Hold, Lateral, LayerDensity, Layers};
 use crate::topology::layers::{Edge, Fictitious, add_layers};
 use crate::topology::plane::Points;
 
@@ -144,51 +146,6 @@ impl Body {
         self.points.len() + 2 * point + axis
     }
 
-    /// `g` at time `t`: held placements and densities; zero elsewhere.
-    pub fn given(&self, t: f64) -> Vec<f64> {
-        let mut given = vec![0.0; 3 * self.points.len()];
-        for (p, (given, density)) in given.iter_mut().zip(&self.density).enumerate() {
-            if self.map.unknown(p).is_none() {
-                *given = *density;
-            }
-        }
-        for &(value, at_rest, k) in &self.held {
-            given[value] = at_rest + self.holds[k].value.at(t);
-        }
-        let Some(layers) = &self.layers else {
-            return given;
-        };
-        let u = layers.displacement.at(t);
-        for &(p, edge) in &self.on_edge {
-            let (axis, sign) = edge.normal();
-            given[self.placement(p, axis)] = self.points.position(p)[axis] + sign as f64 * u;
-        }
-        for (k, f) in self.fictitious.iter().enumerate() {
-            let p = self.material + k;
-            let (axis, sign) = f.edge.normal();
-            let rest = self.points.position(p);
-            given[self.placement(p, axis)] = match layers.normal {
-                Normal::Affine => {
-                    let (centre, size) = self.extents[axis];
-                    centre + (rest[axis] - centre) * (1.0 + 2.0 * u / size)
-                }
-                Normal::Rigid => rest[axis] + sign as f64 * u,
-            };
-            let lateral = self.placement(p, 1 - axis);
-            if self.map.unknown(lateral).is_none() {
-                given[lateral] = rest[1 - axis];
-            }
-        }
-        given
-    }
-
-    /// Times at which what is given jumps or bends.
-    pub fn corners(&self) -> Vec<f64> {
-        let layers = self.layers.iter().flat_map(|l| l.displacement.corners());
-        let holds = self.holds.iter().flat_map(|h| h.value.corners());
-        layers.chain(holds).copied().collect()
-    }
-
     /// Centre and size of the material along an axis.
     fn extent(&self, axis: usize) -> (f64, f64) {
         let cells = (0..self.material).map(|p| self.points.cell(p)[axis]);
@@ -241,38 +198,6 @@ impl Body {
     pub fn displacement(&self, values: &[f64], point: usize) -> [f64; 2] {
         let rest = self.points.position(point);
         [0, 1].map(|d| values[self.placement(point, d)] - rest[d])
-    }
-
-    /// Unknowns of the undeformed body.
-    pub fn start(&self) -> Vec<f64> {
-        let at_rest = |value: usize| match value.checked_sub(self.points.len()) {
-            None => self.density[value],
-            Some(place) => self.points.position(place / 2)[place % 2],
-        };
-        (0..self.map.unknowns())
-            .map(|q| at_rest(self.map.equation(q)))
-            .collect()
-    }
-
-    /// Carries placements over a change of the layers between two times: the affine stretch they impose, with lateral
-    /// contraction by ν = 1/3. False where there are no layers.
-    pub fn stretch(&self, q: &mut [f64], before: f64, now: f64) -> bool {
-        let Some(layers) = &self.layers else {
-            return false;
-        };
-        let axis = layers.edges[0].normal().0;
-        let (u0, u1) = (layers.displacement.at(before), layers.displacement.at(now));
-        let size = self.extents[axis].1;
-        let along = (1.0 + 2.0 * u1 / size) / (1.0 + 2.0 * u0 / size);
-        let across = 1.0 - 2.0 / 3.0 * (u1 - u0) / size;
-        for (k, q) in q.iter_mut().enumerate() {
-            if let Some(place) = self.map.equation(k).checked_sub(self.points.len()) {
-                let centre = self.extents[place % 2].0;
-                let factor = if place % 2 == axis { along } else { across };
-                *q = centre + (*q - centre) * factor;
-            }
-        }
-        true
     }
 
     /// Refuses a body that could move or turn as a whole.

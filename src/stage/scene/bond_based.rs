@@ -10,7 +10,8 @@ use crate::stage::scene::body::{Body, Conditions, NUDGE, nudge, rate_of};
 use crate::stage::scene::density::{DensityParams, GrowthParams, Probes};
 use crate::stage::scene::frame::{Frame, Observer, Summary};
 use crate::stage::scene::march::{Advance, Marching, march};
-use crate::stage::scene::solver::{Equilibrium, SolverParams};
+use crate::stage::scene::solver::{Equilibrium, SolverParams, Stamp};
+use crate::stage::scene::state::State;
 use crate::stage::scene::{Inputs, Scene};
 use serde::{Deserialize, Serialize};
 
@@ -77,7 +78,11 @@ struct Peridynamic {
     /// Unknowns now, and how far they moved in the step before (per unit of time).
     q: Vec<f64>,
     rate: Option<Vec<f64>>,
+    /// Whether a step has been taken: before, supports are where the body is.
+    begun: bool,
     values: Vec<f64>,
+    /// Of the solver's factor.
+    stamp: Option<Stamp>,
 }
 
 impl Peridynamic {
@@ -142,7 +147,9 @@ impl Peridynamic {
             reference: params.density.reference,
             q,
             rate: None,
+            begun: false,
             values,
+            stamp: None,
         })
     }
 
@@ -159,9 +166,17 @@ impl Peridynamic {
 impl Marching for Peridynamic {
     fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged> {
         let given = self.body.given(now);
-        let held = self.body.given(before);
+        let held = match self.begun {
+            true => self.body.given(before),
+            false => self.body.at_rest(),
+        };
         let old = &self.values[..self.body.material];
         let nudged = nudge(&held, &given);
+        let stamp = |given: &[f64]| Stamp {
+            given: given.to_vec(),
+            dt: now - before,
+            old: old.to_vec(),
+        };
         let step = |given| Step {
             model: &self.model,
             map: &self.body.map,
@@ -171,18 +186,26 @@ impl Marching for Peridynamic {
         };
         let mut q = self.q.clone();
         let moved = given != held;
-        if moved && !self.body.stretch(&mut q, before, now) {
-            self.solver
-                .predict(&step(&held), &step(&nudged), NUDGE, &mut q)?;
+        let from = self.begun.then_some(before);
+        if moved && !self.body.stretch(&mut q, from, now) {
+            let (from, to) = (step(&held), step(&nudged));
+            if self.solver.predict(&from, &to, NUDGE, &mut q)? {
+                self.stamp = Some(stamp(&held));
+            }
         }
         let rate = self
             .rate
             .as_deref()
             .filter(|_| !moved)
             .map(|r| (r, now - before));
-        let advance = self.solver.solve(&step(&given), &mut q, rate)?;
+        let whole = || self.model.pattern(&self.body.map);
+        let advance = self.solver.solve(&step(&given), &mut q, rate, whole)?;
+        if advance.factorisations > 0 {
+            self.stamp = Some(stamp(&given));
+        }
         // What a change of the supports moved does not go on.
         self.rate = (!moved).then(|| rate_of(&self.q, &q, now - before));
+        self.begun = true;
         self.q = q;
         self.body.map.expand(&self.q, &given, &mut self.values);
         Ok(advance)
@@ -202,6 +225,36 @@ impl Marching for Peridynamic {
         let change = self.densities();
         self.probes
             .frame(t, &self.body, &self.values, change, with_fields)
+    }
+
+    fn save(&self, state: &mut State) {
+        state.put("q", self.q.as_slice());
+        state.put("values", self.values.as_slice());
+        if let Some(rate) = &self.rate {
+            state.put("rate", rate.as_slice());
+        }
+        self.solver.save(state);
+        self.stamp.iter().for_each(|s| s.save(state));
+    }
+
+    fn restore(&mut self, state: &State) -> Result<()> {
+        let n = self.q.len();
+        self.q = state.array("q", n)?.to_vec();
+        self.values = state.array("values", self.values.len())?.to_vec();
+        self.begun = true;
+        self.rate = state.find("rate").map(<[f64]>::to_vec);
+        self.stamp = Stamp::restore(state, self.values.len())?;
+        let Some(stamp) = &self.stamp else {
+            return Ok(());
+        };
+        let step = Step {
+            model: &self.model,
+            map: &self.body.map,
+            given: &stamp.given,
+            old: &stamp.old,
+            dt: stamp.dt,
+        };
+        self.solver.restore(&step, state, n)
     }
 }
 

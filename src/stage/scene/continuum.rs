@@ -1,64 +1,21 @@
 //! Owns scenes of the local continuum, the twin of bond-based peridynamics.
 
+mod params;
+
+pub use params::{ContinuumParams, DensityAt, EnergyLaw};
+
 use crate::error::{Error, Result};
-use crate::physics::bond_based::micromodulus_discrete;
 use crate::physics::continuum::{Continuum, Old, Step};
 use crate::physics::growth::Weight;
-use crate::physics::hyperelastic::Energy;
 use crate::solve::newton::NotConverged;
-use crate::stage::scene::body::{Body, Conditions, NUDGE, axis_of, nudge, rate_of};
-use crate::stage::scene::density::{DensityParams, GrowthParams, Probes};
+use crate::stage::scene::body::{Body, Conditions, NUDGE, nudge, rate_of};
+use crate::stage::scene::density::Probes;
 use crate::stage::scene::frame::{Frame, Observer, Summary};
+use crate::stage::scene::loads::Loads;
 use crate::stage::scene::march::{Advance, Marching, march};
-use crate::stage::scene::solver::{Equilibrium, SolverParams};
+use crate::stage::scene::solver::{Equilibrium, Stamp};
+use crate::stage::scene::state::State;
 use crate::stage::scene::{Inputs, Scene};
-use serde::{Deserialize, Serialize};
-
-/// `[physics.continuum]`: bilinear quadrilaterals whose nodes are the points of the grid.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ContinuumParams {
-    /// Young's modulus at the reference density.
-    pub young: f64,
-    /// For St. Venant-Kirchhoff; bonds have 1/3.
-    #[serde(default = "third")]
-    pub poisson: f64,
-    #[serde(default)]
-    pub energy: EnergyLaw,
-    /// Where densities live.
-    #[serde(default)]
-    pub density_at: DensityAt,
-    #[serde(default)]
-    pub density: DensityParams,
-    /// Absent: densities stay.
-    #[serde(default)]
-    pub growth: Option<GrowthParams>,
-    #[serde(default)]
-    pub solver: SolverParams,
-}
-
-fn third() -> f64 {
-    1.0 / 3.0
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "kebab-case")]
-pub enum EnergyLaw {
-    #[default]
-    StVenantKirchhoff,
-    /// The local limit of peridynamics: harmonic bonds in all directions.
-    IsotropicBonds,
-    /// The local limit at fixed δ/Δ: harmonic bonds along the grid's stencil.
-    StencilBonds,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
-pub enum DensityAt {
-    #[default]
-    Nodes,
-    Gauss,
-}
 
 /// Runs the scene.
 pub fn run(
@@ -94,48 +51,12 @@ struct Local {
     /// Unknowns now, and how far they moved in the step before (per unit of time).
     q: Vec<f64>,
     rate: Option<Vec<f64>>,
+    /// Whether a step has been taken: before, supports are where the body is.
+    begun: bool,
     values: Vec<f64>,
     old: Old,
-}
-
-/// Forces by time.
-struct Loads(Vec<(crate::stage::scene::conditions::Schedule, Vec<usize>)>);
-
-impl Loads {
-    fn new(scene: &Scene, body: &Body) -> Result<Self> {
-        let one = |(k, load): (usize, &crate::stage::scene::conditions::Load)| {
-            load.value.check(&format!("load[{k}].value"))?;
-            let axis = axis_of(&load.component, &format!("load[{k}].component"))?;
-            let chosen =
-                load.region
-                    .select(&body.points, body.material, &format!("load[{k}].region"))?;
-            Ok((
-                load.value.clone(),
-                chosen.iter().map(|&p| body.placement(p, axis)).collect(),
-            ))
-        };
-        Ok(Loads(
-            scene
-                .load
-                .iter()
-                .enumerate()
-                .map(one)
-                .collect::<Result<_>>()?,
-        ))
-    }
-
-    /// Force on each value at time `t`.
-    fn at(&self, t: f64, values: usize) -> Vec<f64> {
-        if self.0.is_empty() {
-            return Vec::new();
-        }
-        let mut force = vec![0.0; values];
-        for (schedule, places) in &self.0 {
-            let share = schedule.at(t) / places.len() as f64;
-            places.iter().for_each(|&v| force[v] += share);
-        }
-        force
-    }
+    /// Of the solver's factor.
+    stamp: Option<Stamp>,
 }
 
 impl Local {
@@ -199,8 +120,10 @@ impl Local {
             loads,
             q,
             rate: None,
+            begun: false,
             values,
             old,
+            stamp: None,
         })
     }
 
@@ -224,33 +147,6 @@ impl Local {
     }
 }
 
-impl ContinuumParams {
-    fn law(&self, scene: &Scene) -> Result<Energy> {
-        let usable =
-            self.young > 0.0 && self.young.is_finite() && (-0.99..=0.99).contains(&self.poisson);
-        if !usable {
-            return Err(Error::setting(
-                "physics.continuum.young",
-                format!("found young = {}, poisson = {}", self.young, self.poisson),
-                "give a positive modulus and a plane-stress Poisson's ratio between -0.99 and 0.99",
-            ));
-        }
-        Ok(match self.energy {
-            EnergyLaw::StVenantKirchhoff => Energy::plane_stress(self.young, self.poisson),
-            EnergyLaw::IsotropicBonds => Energy::isotropic_bonds(self.young),
-            EnergyLaw::StencilBonds => {
-                let stencil = scene.stencil()?;
-                let quarter =
-                    0.25 * micromodulus_discrete(self.young, &stencil) * stencil.spacing.powi(2);
-                let bond = |b: &crate::topology::family::Bond| {
-                    (b.xi.map(|v| v / b.length), quarter * b.length * b.share)
-                };
-                Energy::Bonds(stencil.bonds.iter().map(bond).collect())
-            }
-        })
-    }
-}
-
 fn require_elements(model: &Continuum) -> Result<()> {
     let bare = (0..model.nodes)
         .filter(|&p| model.around(p).is_empty())
@@ -267,10 +163,18 @@ fn require_elements(model: &Continuum) -> Result<()> {
 impl Marching for Local {
     fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged> {
         let given = self.body.given(now);
-        let held = self.body.given(before);
+        let held = match self.begun {
+            true => self.body.given(before),
+            false => self.body.at_rest(),
+        };
         let load = self.loads.at(now, given.len());
-        let loads_move = load != self.loads.at(before, given.len());
+        let loads_move = !self.begun || load != self.loads.at(before, given.len());
         let nudged = nudge(&held, &given);
+        let stamp = |given: &[f64]| Stamp {
+            given: given.to_vec(),
+            dt: now - before,
+            old: self.old.flat().to_vec(),
+        };
         let step = |given| Step {
             model: &self.model,
             map: &self.body.map,
@@ -282,8 +186,10 @@ impl Marching for Local {
         let mut q = self.q.clone();
         let moved = given != held;
         if moved {
-            self.solver
-                .predict(&step(&held), &step(&nudged), NUDGE, &mut q)?;
+            let (from, to) = (step(&held), step(&nudged));
+            if self.solver.predict(&from, &to, NUDGE, &mut q)? {
+                self.stamp = Some(stamp(&held));
+            }
         }
         let steady = !moved && !loads_move;
         let rate = self
@@ -291,9 +197,14 @@ impl Marching for Local {
             .as_deref()
             .filter(|_| steady)
             .map(|r| (r, now - before));
-        let advance = self.solver.solve(&step(&given), &mut q, rate)?;
+        let whole = || self.model.pattern_from(&self.body.map, 0);
+        let advance = self.solver.solve(&step(&given), &mut q, rate, whole)?;
+        if advance.factorisations > 0 {
+            self.stamp = Some(stamp(&given));
+        }
         // What a change of supports or loads moved does not go on.
         self.rate = steady.then(|| rate_of(&self.q, &q, now - before));
+        self.begun = true;
         self.q = q;
         self.body.map.expand(&self.q, &given, &mut self.values);
         self.old = match &self.old {
@@ -308,8 +219,8 @@ impl Marching for Local {
     }
 
     fn corners(&self) -> Vec<f64> {
-        let loads = self.loads.0.iter().flat_map(|(s, _)| s.corners()).copied();
-        self.body.corners().into_iter().chain(loads).collect()
+        let held = self.body.corners().into_iter();
+        held.chain(self.loads.corners()).collect()
     }
 
     fn densities(&self) -> Vec<f64> {
@@ -324,5 +235,38 @@ impl Marching for Local {
         let change = self.densities();
         self.probes
             .frame(t, &self.body, &self.values, change, with_fields)
+    }
+
+    fn save(&self, state: &mut State) {
+        state.put("q", self.q.as_slice());
+        state.put("values", self.values.as_slice());
+        state.put("old", self.old.flat());
+        if let Some(rate) = &self.rate {
+            state.put("rate", rate.as_slice());
+        }
+        self.solver.save(state);
+        self.stamp.iter().for_each(|s| s.save(state));
+    }
+
+    fn restore(&mut self, state: &State) -> Result<()> {
+        let n = self.q.len();
+        self.q = state.array("q", n)?.to_vec();
+        self.values = state.array("values", self.values.len())?.to_vec();
+        self.old = self.old.like(state.array("old", self.old.flat().len())?);
+        self.begun = true;
+        self.rate = state.find("rate").map(<[f64]>::to_vec);
+        self.stamp = Stamp::restore(state, self.values.len())?;
+        let Some(stamp) = &self.stamp else {
+            return Ok(());
+        };
+        let step = Step {
+            model: &self.model,
+            map: &self.body.map,
+            given: &stamp.given,
+            old: &self.old.like(&stamp.old),
+            dt: stamp.dt,
+            load: &[],
+        };
+        self.solver.restore(&step, state, n)
     }
 }

@@ -1,6 +1,7 @@
 //! Owns what a running scene tells the outside: states as they are accepted, and a closing summary.
 
 use crate::error::Result;
+use crate::stage::scene::state::State;
 use crate::topology::plane::Points;
 use serde::{Deserialize, Serialize};
 
@@ -73,6 +74,14 @@ pub trait Observer {
     fn frame(&mut self, frame: &Frame) -> Result<()>;
     /// Something worth a line: a halved step, a refactorisation.
     fn say(&mut self, line: &str);
+    /// Where this very scene was stopped before, to go on from there. Asked once, after `start`.
+    fn resume(&mut self) -> Result<Option<State>> {
+        Ok(None)
+    }
+    /// After each accepted step: `state` makes the state to go on from, for an observer that keeps it.
+    fn keep(&mut self, _state: &dyn Fn() -> State) -> Result<()> {
+        Ok(())
+    }
 }
 
 /// How a scene ended.

@@ -1,7 +1,9 @@
 //! Owns the lengths of time steps: all alike, or as long as the error they add to the densities allows.
 
+use crate::error::Result;
 use crate::stage::scene::conditions::Time;
 use crate::stage::scene::frame::Output;
+use crate::stage::scene::state::State;
 
 /// A step grows by no more than this, and shrinks to no less than its inverse.
 const GROWTH: f64 = 2.0;
@@ -39,6 +41,27 @@ impl Stride {
 
     pub fn is_adaptive(&self) -> bool {
         self.tolerance.is_some()
+    }
+
+    /// Puts what later lengths depend on into `state`.
+    pub fn save(&self, state: &mut State) {
+        state.put("stride.length", [self.length]);
+        if let Some(before) = &self.before {
+            state.put("stride.dt", [before.dt]);
+            state.put("stride.rate", before.rate.as_slice());
+        }
+    }
+
+    pub fn restore(&mut self, state: &State) -> Result<()> {
+        self.length = state.number("stride.length")?;
+        self.before = match state.find("stride.rate") {
+            Some(rate) => Some(Before {
+                dt: state.number("stride.dt")?,
+                rate: rate.to_vec(),
+            }),
+            None => None,
+        };
+        Ok(())
     }
 
     /// Number of shortest steps from `now` (as many steps from 0) on, not beyond the next output, corner or `end`.

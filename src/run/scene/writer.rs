@@ -1,0 +1,297 @@
+//! Owns what a running scene leaves on disk: history, fields, maps, the animation, and the state to go on from.
+
+use super::differences;
+use crate::error::{Error, Result};
+use crate::io::map::{self, Range};
+use crate::io::state::{self, Kept};
+use crate::io::{atomic, history, plot, points as files};
+use crate::run::session::Session;
+use crate::stage::report::figure::{Axis, Content, Curve, Figure, Mark, Point};
+use crate::stage::scene::frame::{Field, Frame, Observer, Output, Values};
+use crate::stage::scene::state::State;
+use crate::topology::plane::Points;
+use indicatif::ProgressBar;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Scalar fields by name.
+pub type Scalars = Vec<(String, Vec<f64>)>;
+
+/// The state that a stopped scene goes on from, and how much time may pass without keeping it anew.
+const STATE: &str = "state.bin";
+const EVERY: Duration = Duration::from_secs(10);
+
+/// Writes what a scene reports.
+pub struct Writer<'a> {
+    out: &'a Path,
+    output: &'a Output,
+    minus: Option<PathBuf>,
+    session: &'a Session,
+    bar: ProgressBar,
+    points: Option<Points>,
+    history: Vec<Frame>,
+    /// Scalars to draw, by time.
+    maps: Vec<(f64, Scalars)>,
+    /// Of the scene, as a kept state names it.
+    fingerprint: String,
+    kept: Instant,
+    pub every: Duration,
+}
+
+impl<'a> Writer<'a> {
+    /// `fingerprint` is the scene's: a state of another is not gone on from.
+    pub fn new(
+        out: &'a Path,
+        output: &'a Output,
+        folder: &Path,
+        fingerprint: String,
+        session: &'a Session,
+    ) -> Self {
+        Writer {
+            out,
+            output,
+            minus: output.minus.as_ref().map(|p| folder.join(p)),
+            session,
+            bar: ProgressBar::hidden(),
+            points: None,
+            history: Vec::new(),
+            maps: Vec::new(),
+            fingerprint,
+            kept: Instant::now(),
+            every: EVERY,
+        }
+    }
+
+    /// Numbers of the last state.
+    pub fn last(&self) -> serde_json::Map<String, serde_json::Value> {
+        let numbers = self
+            .history
+            .last()
+            .map(|f| f.numbers.clone())
+            .unwrap_or_default();
+        numbers
+            .into_iter()
+            .map(|(name, v)| (name, serde_json::json!(v)))
+            .collect()
+    }
+
+    fn write_history(&self) -> Result<()> {
+        history::write(&self.out.join("history.csv"), &self.history)
+    }
+
+    fn write_fields(&mut self, frame: &Frame) -> Result<()> {
+        let Some(points) = &self.points else {
+            return Ok(());
+        };
+        let name = format!("fields_t{}", frame.time);
+        files::write_csv(&self.out.join(format!("{name}.csv")), points, &frame.fields)?;
+        if self.output.vtk {
+            let path = self.out.join(format!("{name}.vtk"));
+            files::write_vtk(&path, points, &frame.fields, frame.time)?;
+        }
+        self.maps.push((frame.time, self.scalars(&frame.fields)));
+        if !self.output.vtk {
+            return Ok(());
+        }
+        let file = |t: f64| (self.out.join(format!("fields_t{t}.vtk")), t);
+        let series: Vec<_> = self.maps.iter().map(|(t, _)| file(*t)).collect();
+        files::write_series(&self.out.join("fields.vtk.series"), &series)
+    }
+
+    fn scalars(&self, fields: &[Field]) -> Scalars {
+        let wanted = |name: &str| match self.output.maps.is_empty() {
+            true => true,
+            false => self.output.maps.iter().any(|m| m == name),
+        };
+        let scalar = |f: &Field| match &f.values {
+            Values::Scalar(v) if wanted(f.name) => Some((f.name.to_owned(), v.clone())),
+            _ => None,
+        };
+        let mut all: Vec<_> = fields.iter().filter_map(scalar).collect();
+        if self.output.maps.is_empty() {
+            all.truncate(1);
+        }
+        all
+    }
+
+    /// Maps of each scalar with one range over all times, the animation, differences, and the curve of the first number.
+    pub fn finish(&mut self) -> Result<()> {
+        self.bar.finish_and_clear();
+        self.write_history()?;
+        let Some(points) = self.points.take() else {
+            return Ok(());
+        };
+        let names: Vec<String> = self
+            .maps
+            .first()
+            .map(|(_, s)| s.iter().map(|(n, _)| n.clone()).collect())
+            .unwrap_or_default();
+        for (k, name) in names.iter().enumerate() {
+            let all = || {
+                self.maps
+                    .iter()
+                    .filter_map(|(t, s)| s.get(k).map(|(_, v)| (*t, v)))
+            };
+            let range = match self.output.range.filter(|_| k == 0) {
+                Some([low, high]) => Range { low, high },
+                None => Range::of(all().flat_map(|(_, v)| v)),
+            };
+            let mut pictures = Vec::new();
+            for (t, values) in all() {
+                let picture = map::draw(&points, values, range, t);
+                map::write_png(&self.out.join(format!("{name}_t{t}.png")), &picture)?;
+                pictures.push(picture);
+            }
+            if self.output.animation {
+                map::write_gif(&self.out.join(format!("{name}.gif")), pictures)?;
+            }
+        }
+        self.draw_curves()?;
+        match self.minus.clone() {
+            Some(other) => differences::write(self.out, &self.maps, &points, &other),
+            None => Ok(()),
+        }
+    }
+
+    fn draw_curves(&self) -> Result<()> {
+        let Some((name, _)) = self.history.first().and_then(|f| f.numbers.first()) else {
+            return Ok(());
+        };
+        let points = self
+            .history
+            .iter()
+            .map(|f| Point::new(f.time, f.numbers[0].1))
+            .collect();
+        let figure = Figure {
+            stem: "history".into(),
+            scan: None,
+            title: String::new(),
+            caption: String::new(),
+            x: Axis::linear("time"),
+            y: Axis::linear(name),
+            content: Content::Curves(vec![Curve {
+                name: name.clone(),
+                hue: 0,
+                shape: 0,
+                mark: Mark::Rule,
+                points,
+            }]),
+        };
+        let drawing = plot::draw(&figure);
+        atomic::write(&self.out.join("history.svg"), drawing.svg())?;
+        atomic::write(&self.out.join("history.png"), drawing.png()?)
+    }
+}
+
+impl Writer<'_> {
+    fn state_path(&self) -> PathBuf {
+        self.out.join(STATE)
+    }
+
+    /// A finished scene has nothing to go on from.
+    pub fn forget(&self) -> Result<()> {
+        let path = self.state_path();
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::file(
+                path,
+                format!("cannot be removed: {e}"),
+                "remove it by hand: it belongs to a finished scene",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// What had been reported up to a kept state: rows of the history, and maps, from their files.
+    fn recall(&mut self, state: &State) -> Result<()> {
+        let rows = state.number(ROWS)? as usize;
+        self.history = history::read(&self.out.join("history.csv"), rows)?;
+        let times = state.find(TIMES).unwrap_or_default();
+        let names = state.arrays().filter_map(|(n, _)| n.strip_prefix(MAP));
+        // Numbered, so that they come back in their order.
+        let names: Vec<&str> = names.filter_map(|n| Some(n.split_once('.')?.1)).collect();
+        for &t in times {
+            let file = self.out.join(format!("fields_t{t}.csv"));
+            let scalar = |name: &&str| {
+                let values = files::read_column(&file, name)?;
+                Ok((
+                    (*name).to_owned(),
+                    values.into_iter().map(|v| v.1).collect(),
+                ))
+            };
+            let scalars = names.iter().map(scalar).collect::<Result<_>>()?;
+            self.maps.push((t, scalars));
+        }
+        self.bar.set_position(rows as u64);
+        Ok(())
+    }
+}
+
+const ROWS: &str = "writer.rows";
+const TIMES: &str = "writer.times";
+const MAP: &str = "writer.map.";
+
+impl Observer for Writer<'_> {
+    fn start(&mut self, points: &Points, steps: usize) -> Result<()> {
+        self.points = Some(points.clone());
+        self.bar = self.session.bar(steps as u64, "scene");
+        Ok(())
+    }
+
+    fn frame(&mut self, frame: &Frame) -> Result<()> {
+        let row = Frame {
+            fields: Vec::new(),
+            ..frame.clone()
+        };
+        self.history.push(row);
+        if !frame.fields.is_empty() {
+            self.write_history()?;
+            self.write_fields(frame)?;
+        }
+        self.bar.inc(1);
+        Ok(())
+    }
+
+    fn say(&mut self, line: &str) {
+        self.bar.suspend(|| self.session.detail(line));
+    }
+    fn resume(&mut self) -> Result<Option<State>> {
+        if self.session.force {
+            return Ok(None);
+        }
+        let state = match state::read(&self.state_path(), &self.fingerprint) {
+            Kept::Nothing => return Ok(None),
+            Kept::Unusable(why) => {
+                self.session
+                    .say(format!("{STATE} is not used: {why}; starting anew"));
+                return Ok(None);
+            }
+            Kept::State(state) => state,
+        };
+        if let Err(e) = self.recall(&state) {
+            self.session
+                .say(format!("{STATE} is not used: {e}\nstarting anew"));
+            self.history.clear();
+            self.maps.clear();
+            return Ok(None);
+        }
+        Ok(Some(state))
+    }
+
+    fn keep(&mut self, state: &dyn Fn() -> State) -> Result<()> {
+        if self.kept.elapsed() < self.every {
+            return Ok(());
+        }
+        self.write_history()?;
+        let mut state = state();
+        state.put(ROWS, [self.history.len() as f64]);
+        let times: Vec<f64> = self.maps.iter().map(|(t, _)| *t).collect();
+        state.put(TIMES, times);
+        let names = self.maps.first().map(|(_, s)| s.as_slice());
+        for (k, (name, _)) in names.unwrap_or_default().iter().enumerate() {
+            state.put(&format!("{MAP}{k:04}.{name}"), []);
+        }
+        state::write(&self.state_path(), &self.fingerprint, &state)?;
+        self.kept = Instant::now();
+        Ok(())
+    }
+}

@@ -7,6 +7,7 @@ RUNS holds one folder per scene, named as below; what is missing is left out and
 
 import csv
 import json
+import math
 import pathlib
 import sys
 
@@ -93,6 +94,28 @@ def compact_tension():
     save("potential-drop")
 
 
+def slopes():
+    """Inclination of each crack of the compact tension runs, by its distance from the slit's end: the principal axis of
+    the points that have lost more than 0.4 of their bonds."""
+    for z in (0, 45, 60, 90):
+        path = RUNS / f"compact-tension-{z}" / "fields_t0.4.csv"
+        if not path.exists():
+            print(f"left out: {path} is missing")
+            continue
+        rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(open(path))]
+        crack = [(r["x"] - 9.288, r["y"], r["damage"]) for r in rows if r["damage"] > 0.4 and r["x"] > 8.8]
+        for near in (0, 3, 6, 9):
+            part = [(x, y, d) for x, y, d in crack if near <= math.hypot(x, y) < near + 3]
+            if len(part) < 6:
+                continue
+            weight = sum(d for *_, d in part)
+            mx, my = (sum(p[i] * p[2] for p in part) / weight for i in (0, 1))
+            xx, yy, xy = (sum(d * a(x - mx, y - my) for x, y, d in part)
+                          for a in (lambda x, y: x * x, lambda x, y: y * y, lambda x, y: x * y))
+            angle = math.degrees(0.5 * math.atan2(2 * xy, xx - yy))
+            print(f"compact tension, {z} degrees, {near} to {near + 3} mm: inclined by {angle:.1f} degrees")
+
+
 def kinking():
     """Criteria of maximum hoop stress, as the report's text prints them for 0, 10, ... 90 degrees."""
     criterion = {
@@ -143,4 +166,5 @@ maps("compact-tension", [f"compact-tension-{z}/damage_t0.4.png" for z in (0, 45,
 energy_angle()
 plate()
 compact_tension()
+slopes()
 kinking()

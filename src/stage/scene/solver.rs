@@ -132,6 +132,10 @@ impl Equilibrium {
         from.residual(q, &mut r0);
         to.residual(q, &mut r1);
         let mut dq: Vec<f64> = r1.iter().zip(&r0).map(|(b, a)| (b - a) / share).collect();
+        // Without load, bone may be gone within the step: there is nothing to start from but the guess itself.
+        if dq.iter().any(|v| !v.is_finite()) {
+            return Ok(false);
+        }
         let renewed = match self {
             Equilibrium::Newton(newton) => {
                 newton.respond(from, q, &mut dq)?;

@@ -283,7 +283,7 @@ fn plan(
             ..session.clone()
         };
         let known = segment::in_memory(&job.input, Some(&job.name), &job.segment, &quiet)
-            .and_then(|(_, s)| of_specimen(&s.specimen, first, recipe));
+            .and_then(|specimen| of_specimen(&specimen, first, recipe));
         bar.inc(1);
         let estimate = *known.as_ref().unwrap_or(first);
         results.push(match &known {

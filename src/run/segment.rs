@@ -6,7 +6,7 @@ use crate::io::specimen::{self, Input, SegmentRecord};
 use crate::io::{atomic, picture, scan};
 use crate::measure::spheres::Spread;
 use crate::run::session::Session;
-use crate::stage::segment::{self as stage, SegmentParams, Segmented, Voi};
+use crate::stage::segment::{self as stage, SegmentParams, Voi};
 use crate::volume::{Specimen, Volume};
 use std::path::Path;
 
@@ -32,18 +32,19 @@ pub fn segment(
         session.say(format!("{}: up to date", dir.display()));
         return Ok(kept);
     }
-    let (scan, segmented) = in_memory(input, name, params, session)?;
+    let (scan, voi_mask) = read(input, name, params, session)?;
+    let segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
     let record = SegmentRecord {
         program: env!("CARGO_PKG_NAME").into(),
         version: env!("CARGO_PKG_VERSION").into(),
-        scan: scan.name,
+        scan: scan.name.clone(),
         input: Input {
             path: input.to_path_buf(),
             blake3,
             voi_blake3,
-            format: scan.format,
-            unit: scan.unit,
-            notes: scan.notes,
+            format: scan.format.clone(),
+            unit: scan.unit.clone(),
+            notes: scan.notes.clone(),
         },
         settings: params.clone(),
         results: segmented.summary,
@@ -64,7 +65,18 @@ pub fn in_memory(
     name: Option<&str>,
     params: &SegmentParams,
     session: &Session,
-) -> Result<(Scan, Segmented)> {
+) -> Result<Specimen> {
+    let (scan, voi_mask) = read(input, name, params, session)?;
+    Ok(stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?.specimen)
+}
+
+/// The scan, and the mask that is its volume of interest, if one is.
+fn read(
+    input: &Path,
+    name: Option<&str>,
+    params: &SegmentParams,
+    session: &Session,
+) -> Result<(Scan, Option<Volume<u8>>)> {
     let mut scan = scan::read_in(input, params.spacing_mm, params.units)?;
     if let Some(name) = name {
         scan.name = name.to_owned();
@@ -79,8 +91,7 @@ pub fn in_memory(
         )?),
         _ => None,
     };
-    let segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
-    Ok((scan, segmented))
+    Ok((scan, voi_mask))
 }
 
 /// The specimen that `segment` left in `dir`.

@@ -138,7 +138,8 @@ def kinking():
         axis.set_title({"silicon": "silicon <100>", "anisotropic": "fully anisotropic"}[material], fontsize=9)
         axis.set_xlabel("mixity (degrees)")
     axes[0].set_ylabel("kink (degrees)")
-    axes[0].legend(fontsize=8)
+    for axis in axes:
+        axis.legend(fontsize=8, loc="lower right")
     save("kinking")
 
 

@@ -218,7 +218,10 @@ pub fn march(
 /// Doubles a halved step that has done well, where the longer one ends on the planned steps.
 fn grow(progress: &mut Progress, clock: &Clock, observer: &mut dyn Observer) {
     let Progress { level, streak, .. } = *progress;
-    if level > 0 && streak >= GROW_AFTER && progress.ticks % (clock.whole >> (level - 1)) == 0 {
+    if level > 0
+        && streak >= GROW_AFTER
+        && progress.ticks.is_multiple_of(clock.whole >> (level - 1))
+    {
         progress.level -= 1;
         progress.streak = 0;
         observer.say(&format!(

@@ -89,3 +89,19 @@ fn graded_lattices_of_the_real_stack_are_near_voxel_elements() {
         assert!((e / 73.0 - 1.0).abs() < 0.05, "{row:?}");
     }
 }
+
+/// Elements a three-hundredth of a voxel: no machine has that memory, and none is asked for it.
+#[test]
+fn a_solve_that_will_not_fit_is_refused_with_what_would() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = phantom(dir.path());
+    let (code, _, words) = run(&["solve", &out, "--method", "voxel-fe", "--refine", "300"]);
+    assert_eq!(code, 2, "{words}");
+    assert!(
+        words.contains("MiB are free") && words.contains("--refine 299"),
+        "{words}"
+    );
+    let (code, _, words) = run(&["solve", &out, "--lp", "0.0001", "--boundary", "floppy"]);
+    assert_eq!(code, 2, "{words}");
+    assert!(words.contains("lattice parameter of"), "{words}");
+}

@@ -247,6 +247,7 @@ mod tests {
             converged: Some(true),
             voxel_mm: "0.02".to_owned(),
             mean_thickness_mm: Some(0.16),
+            tv_mm3: 64.0,
             wall_s: Some(1.0),
             ..Row::default()
         }

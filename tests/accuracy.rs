@@ -98,9 +98,12 @@ fn a_solve_that_will_not_fit_is_refused_with_what_would() {
     let (code, _, words) = run(&["solve", &out, "--method", "voxel-fe", "--refine", "300"]);
     assert_eq!(code, 2, "{words}");
     assert!(
-        words.contains("MiB are free") && words.contains("--refine 299"),
+        words.contains("MiB are free") && words.contains("or --refine "),
         "{words}"
     );
+    let fits = words.split("--refine ").nth(1).unwrap();
+    let fits: usize = fits.split_whitespace().next().unwrap().parse().unwrap();
+    assert!(fits < 200, "{words}");
     let (code, _, words) = run(&["solve", &out, "--lp", "0.0001", "--boundary", "floppy"]);
     assert_eq!(code, 2, "{words}");
     assert!(words.contains("lattice parameter of"), "{words}");

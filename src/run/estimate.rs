@@ -182,7 +182,12 @@ pub fn refuse_what_does_not_fit(
             "crop the scan, or take a lattice parameter of {:.3} mm or more",
             case.lp_mm * (1.1 * factor).cbrt()
         ),
-        None if params.refine > 1 => format!("crop the scan, or --refine {}", params.refine - 1),
+        None if params.refine > 1 => {
+            let fits = (params.refine as f64 / (1.1 * factor).cbrt())
+                .floor()
+                .max(1.0);
+            format!("crop the scan, or --refine {fits:.0}")
+        }
         None => format!(
             "crop the scan, or --coarsen {} (the modulus will be less exact), or use lattices",
             (params.coarsen as f64 * (1.1 * factor).cbrt()).ceil()

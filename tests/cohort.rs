@@ -374,3 +374,64 @@ fn a_solve_that_stops_early_exits_1_and_marks_its_row() {
     let report = fs::read_to_string(out.join("report/report.md")).unwrap();
     assert!(report.contains("not converged"), "{report}");
 }
+
+/// One scan of a finished cohort run anew, as on a cluster: the others stay in the tables, in their places.
+#[test]
+fn a_single_scan_run_anew_does_not_take_the_others_from_the_table() {
+    let (dir, scans, recipe) = cohort(3);
+    fs::write(scans.join("s2.nii.gz"), b"no scan").unwrap();
+    let out = dir.path().join("out");
+    let words = ["run", text(&recipe), text(&scans), "-o", text(&out)];
+    assert_eq!(run(&words).0, 1);
+    let whole = timeless(&out);
+    let again = [&words[..], &["--only", "s3", "--force"]].concat();
+    assert_eq!(run(&again).0, 0);
+    assert_eq!(timeless(&out), whole);
+    let failed = fs::read_to_string(out.join("failed.csv")).unwrap();
+    assert!(failed.contains("s2"), "{failed}");
+}
+
+#[test]
+fn morphometry_stands_beside_the_modulus() {
+    let (dir, scans, recipe) = cohort(1);
+    let out = dir.path().join("out");
+    let words = ["run", text(&recipe), text(&scans), "-o", text(&out)];
+    assert_eq!(run(&words).0, 0);
+    assert!(rows(&out).iter().all(|row| row.tb_th_mm.is_none()));
+    let measured = [&words[..], &["--morphometry"]].concat();
+    assert_eq!(run(&measured).0, 0);
+    for row in rows(&out) {
+        assert!(
+            row.tb_th_mm.unwrap() > 0.05 && row.tb_sp_mm.unwrap() > 0.05,
+            "{row:?}"
+        );
+        assert!(
+            row.conn_d_per_mm3.is_some() && row.da.unwrap() >= 1.0,
+            "{row:?}"
+        );
+    }
+    let page = fs::read_to_string(out.join("report/report.html")).unwrap();
+    assert!(page.contains("Tb.Sp (mm)") && page.contains("Conn.D"));
+}
+
+/// Every size is solved once, and stands once in the table.
+#[test]
+fn a_stated_error_leaves_no_row_twice() {
+    let (dir, scans, recipe) = cohort(1);
+    let out = dir.path().join("out");
+    let words = [
+        "run",
+        text(&recipe),
+        text(&scans),
+        "-o",
+        text(&out),
+        "--error",
+        "4%",
+    ];
+    assert!(run(&words).0 <= 1);
+    let rows = rows(&out);
+    assert!(rows.iter().any(|row| row.method == "voxel-fe"));
+    for (at, row) in rows.iter().enumerate() {
+        assert!(!rows[..at].contains(row), "{row:?}");
+    }
+}

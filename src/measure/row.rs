@@ -60,4 +60,10 @@ pub struct Row {
     /// By Pistoia's criterion, on request: magnitude of the reaction at failure, and what the load is multiplied by.
     pub failure_load_n: Option<f64>,
     pub failure_factor: Option<f64>,
+    /// Of the whole mask, where `segment --morphometry` measured it: mean local thickness of bone and of pores,
+    /// connectivity density, degree of anisotropy by mean intercept lengths.
+    pub tb_th_mm: Option<f64>,
+    pub tb_sp_mm: Option<f64>,
+    pub conn_d_per_mm3: Option<f64>,
+    pub da: Option<f64>,
 }

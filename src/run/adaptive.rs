@@ -4,7 +4,7 @@
 //! differ by a factor of two, beginning at the coarsest pair that can be expected to suffice.
 
 use crate::error::Result;
-use crate::measure::extrapolate::{EXTRAPOLATED, expected_of_pair};
+use crate::measure::extrapolate::{EXTRAPOLATED, expected_of_pair, with_extrapolated};
 use crate::measure::row::Row;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::run::segment::load;
@@ -12,6 +12,7 @@ use crate::run::session::Session;
 use crate::run::solve::{in_words, solve};
 use crate::stage::lattice::{Boundary, LatticeParams, Structure};
 use crate::stage::solve::{Method, SolveParams};
+use crate::volume::Volume;
 use std::path::Path;
 
 /// Lattice parameters tried, in strut thicknesses.
@@ -116,12 +117,34 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
                 session,
             )?);
         }
-        rows.extend(crate::measure::extrapolate::with_extrapolated(&own));
+        // Neighbouring pairs share a size.
+        let new = with_extrapolated(&own);
+        rows.extend(
+            new.into_iter()
+                .filter(|row| !rows.contains(row))
+                .collect::<Vec<_>>(),
+        );
         if meets(&rows, target) {
             break;
         }
     }
     Ok(finish(rows, target, session))
+}
+
+/// What [`solve_to`] can be expected to come to for a specimen, if lattices do not suffice: the finer voxel-FE solve of the
+/// first pair that should.
+pub fn expected(bone: &Volume<u8>, target: f64, params: &SolveParams) -> SolveParams {
+    let voxel = bone.grid.voxel_mm3().cbrt();
+    let suffices = |thickness: f64| {
+        let size = |(coarsen, refine): (usize, usize)| voxel * coarsen as f64 / refine as f64;
+        PAIRS
+            .into_iter()
+            .find(|pair| expected_of_pair(size(*pair), thickness) <= MARGIN * target)
+    };
+    let (coarsen, refine) = plate_thickness_mm(bone)
+        .and_then(suffices)
+        .unwrap_or((1, 1));
+    voxel_fe(params, coarsen, refine)
 }
 
 fn voxel_fe(params: &SolveParams, coarsen: usize, refine: usize) -> SolveParams {

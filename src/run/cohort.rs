@@ -11,6 +11,7 @@ use crate::run::results::Results;
 use crate::run::scans::{self, ScanJob, Selection};
 use crate::run::session::Session;
 use crate::run::{Outcome, adaptive, host, lattice, report, segment, solve};
+use crate::stage::segment::SegmentParams;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -65,6 +66,7 @@ pub fn cohort(
     let run = Run {
         recipe,
         out,
+        names: all_names(&jobs, inputs, &segment, selection, session)?,
         jobs: &jobs,
         session,
         bar: session.bar(jobs.len() as u64, "scans"),
@@ -84,10 +86,33 @@ pub fn cohort(
     run.finish(&estimates)
 }
 
+/// Names of all scans of the inputs, those that `--only` leaves out among them: one scan run anew does not take the others
+/// from the tables.
+fn all_names(
+    jobs: &[ScanJob],
+    inputs: &[PathBuf],
+    segment: &SegmentParams,
+    selection: &Selection,
+    session: &Session,
+) -> Result<Vec<String>> {
+    let name = |job: &ScanJob| job.name.clone();
+    if selection.only.is_none() {
+        return Ok(jobs.iter().map(name).collect());
+    }
+    let all = Selection {
+        only: None,
+        ..selection.clone()
+    };
+    let all = scans::find(inputs, segment, &all, session)?;
+    Ok(all.iter().map(name).collect())
+}
+
 /// A run under way.
 struct Run<'a> {
     recipe: &'a Recipe,
     out: &'a Path,
+    /// All scans, in the order of the inputs; some may not be run this time, but were before.
+    names: Vec<String>,
     jobs: &'a [ScanJob],
     session: &'a Session,
     bar: ProgressBar,
@@ -138,12 +163,26 @@ impl Run<'_> {
 
     /// All rows so far, in the order of the scans.
     fn write_rows(&self, done: &[Option<Result<Vec<Row>>>]) -> Result<Vec<Row>> {
-        let solved = done.iter().flatten().flatten();
-        let rows: Vec<Row> = solved.flatten().cloned().collect();
+        let mut rows = Vec::new();
+        for name in &self.names {
+            match self.job(name) {
+                Some(i) => rows.extend(done[i].iter().flatten().flatten().cloned()),
+                None => {
+                    let file = self.out.join(name).join("results.csv");
+                    if file.is_file() {
+                        rows.extend(table::read::<Row>(&file)?);
+                    }
+                }
+            }
+        }
         if !rows.is_empty() {
             table::write(&self.out.join("results.csv"), &rows)?;
         }
         Ok(rows)
+    }
+
+    fn job(&self, name: &str) -> Option<usize> {
+        self.jobs.iter().position(|job| job.name == name)
     }
 
     /// The table, the report, and what became of each scan.
@@ -154,7 +193,10 @@ impl Run<'_> {
         }
         atomic::create_dir(self.out)?;
         let rows = self.write_rows(&done)?;
-        let failures = failures(self.jobs, &done);
+        let mut failures = failures(self.jobs, &done);
+        let left_out = |name: &String| self.names.contains(name) && self.job(name).is_none();
+        let known = report::failures_in(self.out).into_iter();
+        failures.extend(known.filter(|failure| left_out(&failure.scan)));
         report::write_failures(self.out, &failures)?;
         if !rows.is_empty() {
             let recipe = toml::to_string(self.recipe).expect("settings are plain data");

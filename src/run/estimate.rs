@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::io::extent;
 use crate::recipe::Recipe;
-use crate::run::host;
+use crate::run::{adaptive, host};
 use crate::stage::lattice::{Case, LatticeParams};
 use crate::stage::solve::{Method, SolveParams, need};
 use crate::volume::Specimen;
@@ -115,17 +115,21 @@ fn lattice(size_mm: Option<[f64; 3]>, recipe: &Recipe) -> (f64, Option<f64>) {
 /// # Errors
 /// Settings that do not fit the specimen.
 pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Result<Estimate> {
+    let params = &match recipe.error {
+        Some(target) => adaptive::expected(&specimen.bone, target, &recipe.solve),
+        None => recipe.solve.clone(),
+    };
     let voxels = specimen.bone.grid.len() as f64;
     let reading = first
         .voxels
         .map_or(voxels, |n| n.iter().map(|v| *v as f64).product());
     let mut bytes = reading * reading_bytes(recipe);
-    for case in cases(&recipe.lattice, &recipe.solve) {
-        bytes = bytes.max(voxels + need::of(specimen, case.as_ref(), &recipe.solve)?);
+    for case in cases(&recipe.lattice, params) {
+        bytes = bytes.max(voxels + need::of(specimen, case.as_ref(), params)?);
     }
-    let time_s = match recipe.solve.method {
+    let time_s = match params.method {
         Method::Lattice => first.time_s,
-        Method::VoxelFe => Some(elements(specimen, &recipe.solve) * S_PER_ELEMENT),
+        Method::VoxelFe => Some(elements(specimen, params) * S_PER_ELEMENT),
     };
     Ok(Estimate {
         memory_mib: mib(BASE + bytes),

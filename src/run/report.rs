@@ -6,6 +6,7 @@ use crate::io::html::{self, ScanPage, Source};
 use crate::io::specimen::{self, SegmentRecord};
 use crate::io::{atomic, markdown, plot, table};
 use crate::measure::row::Row;
+use crate::measure::spheres::Spread;
 use crate::recipe::Recipe;
 use crate::run::host;
 use crate::run::session::Session;
@@ -27,6 +28,11 @@ pub struct Failure {
     pub reason: String,
 }
 
+/// What an earlier run wrote into `failed.csv`.
+pub fn failures_in(out: &Path) -> Vec<Failure> {
+    table::read(&out.join(FAILED)).unwrap_or_default()
+}
+
 /// Writes `failed.csv`, or removes that of an earlier run.
 pub fn write_failures(out: &Path, failures: &[Failure]) -> Result<()> {
     let file = out.join(FAILED);
@@ -46,7 +52,7 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
     let mut failures: Vec<Failure> = Vec::new();
     for dir in dirs {
         rows.extend(table::read(&results_file(dir)?)?);
-        failures.extend(table::read(&dir.join(FAILED)).unwrap_or_default());
+        failures.extend(failures_in(dir));
     }
     session.detail(format!("{} rows from {} folders", rows.len(), dirs.len()));
     let recipe = dirs
@@ -213,6 +219,18 @@ fn facts(record: &SegmentRecord) -> Vec<(String, String)> {
     }
     if let Some(t) = results.mean_thickness_mm {
         facts.push(("mean strut thickness (mm)", format!("{t:.3}")));
+    }
+    if let Some(m) = &results.morphometry {
+        let spread = |s: &Option<Spread>| {
+            s.as_ref().map_or("NA".into(), |s| {
+                format!("{:.3} ± {:.3}", s.mean_mm, s.sd_mm)
+            })
+        };
+        facts.push(("Tb.Th (mm)", spread(&m.tb_th)));
+        facts.push(("Tb.Sp (mm)", spread(&m.tb_sp)));
+        facts.push(("Conn.D (1/mm³)", format!("{:.3}", m.conn_d_per_mm3)));
+        let da = m.fabric.map_or("NA".into(), |f| format!("{:.3}", f.da));
+        facts.push(("DA", da));
     }
     facts.extend(results.warnings.iter().map(|w| ("warning", w.clone())));
     facts

@@ -165,7 +165,7 @@ fn descend(
 
 /// Names become folders beside the run's own files.
 fn refuse_names(jobs: &[ScanJob]) -> Result<()> {
-    const OWN: [&str; 3] = ["report", "results.csv", "recipe.toml"];
+    const OWN: [&str; 4] = ["report", "results.csv", "recipe.toml", "failed.csv"];
     let path_like = |name: &str| name.contains(['/', '\\', '\0']) || [".", ".."].contains(&name);
     for job in jobs {
         let name = job.name.as_str();

@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::io::{inp, nifti, specimen, vti};
 use crate::measure::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapolated};
 use crate::measure::ffb::with_ffb;
+use crate::measure::morphometry::Morphometry;
 use crate::measure::row::Row;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::run::lattice::binned;
@@ -43,6 +44,7 @@ pub fn solve(
         warn_of_coarse(dir, lattices, session);
     }
     let mean_thickness_mm = plate_thickness_mm(&specimen.bone);
+    let morphometry = specimen::record(dir).and_then(|record| record.results.morphometry);
     let mut results = Results::open(dir, session.force)?;
     let mut rows = Vec::new();
     for job in jobs(lattices, params) {
@@ -52,7 +54,7 @@ pub fn solve(
         };
         let blank = job.label(&specimen, params, settings);
         let kept = results.find(&blank, params);
-        let row = match kept
+        let mut row = match kept
             .filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params))
             // Fields are written over by the next solve: whether those there are these is not known.
             .filter(|_| params.fields.is_empty())
@@ -71,6 +73,7 @@ pub fn solve(
                 solve_job(dir, &specimen, &job, &blank, params, session)?
             }
         };
+        mark(&mut row, morphometry.as_ref());
         session.say(in_words(&row));
         results.keep(&blank, params, &row)?;
         rows.push(row);
@@ -120,6 +123,14 @@ fn warn_of_coarse(dir: &Path, lattice: &LatticeParams, session: &Session) {
             coarse.join(", ")
         ));
     }
+}
+
+/// Puts the specimen's morphometry beside its modulus.
+fn mark(row: &mut Row, measured: Option<&Morphometry>) {
+    row.tb_th_mm = measured.and_then(|m| Some(m.tb_th.as_ref()?.mean_mm));
+    row.tb_sp_mm = measured.and_then(|m| Some(m.tb_sp.as_ref()?.mean_mm));
+    row.conn_d_per_mm3 = measured.map(|m| m.conn_d_per_mm3);
+    row.da = measured.and_then(|m| Some(m.fabric.as_ref()?.da));
 }
 
 /// One row to solve.

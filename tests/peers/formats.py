@@ -1,6 +1,6 @@
-"""Files written by independent software, read by bonepd-ct: geometry, orientation, units and every voxel.
+"""Files written by independent software, read by bonepd-ct: geometry, orientation, units, and a block of bone voxel by voxel of its mask.
 
-    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom tifffile aimio-py numpy
+    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom tifffile Pillow aimio-py numpy
     /tmp/peers/bin/python tests/peers/formats.py target/release/bonepd-ct
 
 A writer that is not installed is skipped with its reason. Exit code 1 if anything differs.

@@ -45,6 +45,10 @@ def main():
         (folder / "scans").mkdir()
         for name in ("trabecular", "sparse", "dense"):
             shutil.copy(ROOT / f"sample_data/{name}.nii.gz", folder / "scans")
+        (folder / "scans/broken.nii.gz").write_bytes(b"no scan")
+        workflow(folder)
+        assert "broken" in (folder / "out/failed.csv").read_text(), "the broken scan is not named"
+        (folder / "scans/broken.nii.gz").unlink()
         workflow(folder)
         plain = [PROGRAM, "run", ROOT / "pipelines/quick.toml", "scans", "-o", "plain", "--quiet"]
         subprocess.run(plain, cwd=folder, check=True)

@@ -17,6 +17,10 @@ use rayon::prelude::*;
 /// Fall of the residual's norm, or of the energy, after which both are made anew: far enough from what single precision resolves.
 const REPLACE: f64 = 1e-3;
 
+/// Part of the residual's norm below which an entry is what rounding left of none. Carried on, its products would fall
+/// below what single precision holds in full, and such take a hundred times as long.
+const ROUNDING: f64 = 1e-15;
+
 type Single = Vec<[f32; 3]>;
 
 /// As [`crate::solve::cg::minimise`].
@@ -142,7 +146,8 @@ fn residual(
                 let free = !held.is_held(first + i, d);
                 let v = if free { -f[d] } else { 0.0 };
                 squared += v * v;
-                r[d] = (v / unit) as f32;
+                let v = v / unit;
+                r[d] = if v.abs() > ROUNDING { v as f32 } else { 0.0 };
             }
         }
         [energy, squared]

@@ -38,9 +38,16 @@ impl Stencils<f64> {
         Stencils { table }
     }
 
+    /// What rounding left where elements' contributions cancel becomes zero: products with it would fall below what single
+    /// precision holds in full, and such take a hundred times as long.
     pub fn to_f32(&self) -> Stencils<f32> {
+        let largest = self.table.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let single = |&v: &f64| match v.abs() > 1e-12 * largest {
+            true => v as f32,
+            false => 0.0,
+        };
         Stencils {
-            table: self.table.iter().map(|&v| v as f32).collect(),
+            table: self.table.iter().map(single).collect(),
         }
     }
 

@@ -26,7 +26,7 @@ pub fn write(path: &Path, frames: &[Frame]) -> Result<()> {
     })
 }
 
-/// The first `rows` rows of what [`write`] left, as frames without fields.
+/// The first `rows` rows of what [`write()`] left, as frames without fields.
 pub fn read(path: &Path, rows: usize) -> Result<Vec<Frame>> {
     let bad = |found: String| Error::file(path, found, "start the scene anew with --force");
     let mut reader =

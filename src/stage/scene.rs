@@ -9,6 +9,7 @@ pub mod density;
 pub mod frame;
 mod loads;
 mod march;
+pub mod pace;
 pub mod solver;
 pub mod state;
 mod stride;

@@ -73,6 +73,48 @@ fn a_step_too_large_stops_with_the_last_good_state() {
     assert!((last.time - 1.0).abs() < 1e-9 && !last.fields.is_empty());
 }
 
+/// Edges that move within the first planned step, and few iterations: it has to be halved, and grows back once they rest.
+#[test]
+fn a_step_that_halves_and_grows_says_so() {
+    let square = Square {
+        rows: 4,
+        model: "solver = { max_iterations = 5 }",
+        ..Square::new(10, 3.01)
+    };
+    let plain = square.text().replace("step = 0.1", "step = 1.0");
+    let (from, to) = (
+        plain.find("{ until").unwrap(),
+        plain.find("[[hold]]").unwrap(),
+    );
+    let ramp = "{ times = [0, 1, 20], values = [0, 0.05, 0.05] }\n";
+    let text = format!("{}{ramp}{}", &plain[..from], &plain[to..]);
+    let (summary, recorder) = simulate(&text).unwrap();
+    assert!(summary.converged, "{summary:?}");
+    let pace = summary.pace.unwrap();
+    let said = |what: &str| recorder.lines.iter().filter(|l| l.contains(what)).count();
+    assert!(pace.halvings >= 2 && pace.growths >= 2, "{pace:?}");
+    assert_eq!(pace.halvings, said("step halved"), "{:?}", recorder.lines);
+    assert_eq!(pace.growths, said("step grown"), "{:?}", recorder.lines);
+    let least = 0.5f64.powi(pace.halvings as i32);
+    assert_eq!([pace.shortest_step, pace.longest_step], [least, 1.0]);
+    let words = pace.to_string();
+    assert!(
+        words.contains("halved 2 times, grown 2 times; steps taken from 2.500e-1 to 1.000e0"),
+        "{words}"
+    );
+}
+
+#[test]
+fn a_step_that_never_changed_has_nothing_to_say() {
+    let square = Square {
+        end: 0.3,
+        rows: 4,
+        ..Square::new(10, 3.01)
+    };
+    let pace = simulate(&square.text()).unwrap().0.pace.unwrap();
+    assert!(!pace.changed(), "{pace:?}");
+}
+
 fn refusal(text: &str) -> String {
     simulate(text).map(|_| ()).unwrap_err().to_string()
 }
@@ -109,6 +151,20 @@ fn what_cannot_work_is_refused_in_words() {
             "whole number of cells",
         ),
         (with("horizon_ratio = 3.01", "horizon = -1.0"), "δ/Δ"),
+        (
+            with(
+                "young = 1.0",
+                "young = 1.0\n micromodulus = { finite = -0.1 }",
+            ),
+            "micromodulus.finite",
+        ),
+        (
+            with(
+                "young = 1.0",
+                "young = 1.0\n micromodulus = { finite = 0.0 }",
+            ),
+            "give a positive one",
+        ),
         (with("step = 0.1", "step = 0.3"), "whole number of steps"),
     ];
     for (words, expected) in cases {

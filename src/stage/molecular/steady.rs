@@ -193,6 +193,7 @@ pub fn summary(
         bonds: setup.bond_count(),
         steps,
         converged: true,
+        pace: None,
         numbers,
         stopped: None,
     }

@@ -41,7 +41,7 @@ pub enum Micromodulus {
     Discrete,
     /// `9E / (π δ³)`: the continuum's.
     Continuous,
-    /// The continuum's, fitted at this finite biaxial strain `e` to St. Venant-Kirchhoff: `× (1 + e/2)²`.
+    /// The continuum's, fitted at this finite biaxial strain `e` to St. Venant-Kirchhoff: `× (1 + e/2)²`. Above 0.
     Finite(f64),
 }
 
@@ -265,6 +265,15 @@ impl Micromodulus {
                 "physics.bond-based.young",
                 format!("found {young}"),
                 "give a positive modulus",
+            ));
+        }
+        if let Micromodulus::Finite(e) = self
+            && !(e.is_finite() && e > 0.0)
+        {
+            return Err(Error::setting(
+                "physics.bond-based.micromodulus.finite",
+                format!("found a biaxial strain of {e}"),
+                "give a positive one, such as 0.163, or micromodulus = \"continuous\" for small strain",
             ));
         }
         Ok(match self {

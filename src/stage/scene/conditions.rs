@@ -213,7 +213,7 @@ pub enum LayerDensity {
     /// That of the point they mirror.
     #[default]
     Mirrored,
-    /// The initial density.
+    /// The reference density ρ*, at all times.
     Fixed,
 }
 

@@ -1,6 +1,7 @@
 //! Owns what a running scene tells the outside: states as they are accepted, and a closing summary.
 
 use crate::error::Result;
+use crate::stage::scene::pace::Pace;
 use crate::stage::scene::state::State;
 use crate::topology::plane::Points;
 use serde::{Deserialize, Serialize};
@@ -94,6 +95,9 @@ pub struct Summary {
     pub bonds: usize,
     pub steps: usize,
     pub converged: bool,
+    /// How the time step changed, where time is marched through.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pace: Option<Pace>,
     /// Further numbers by name.
     pub numbers: Vec<(String, f64)>,
     /// Why it stopped early, where it did.

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::solve::newton::NotConverged;
 use crate::stage::scene::conditions::Time;
 use crate::stage::scene::frame::{Frame, Observer, Output, Summary};
+use crate::stage::scene::pace::Pace;
 use crate::stage::scene::state::State;
 use crate::stage::scene::stride::Stride;
 
@@ -73,6 +74,11 @@ impl Clock {
         planned as f64 * self.step + self.step * rest as f64 / self.whole as f64
     }
 
+    /// Length of so many ticks: the same wherever they begin.
+    fn span(&self, ticks: u64) -> f64 {
+        self.step * (ticks as f64 / self.whole as f64)
+    }
+
     fn length(&self, level: u32) -> f64 {
         self.step / (1u64 << level) as f64
     }
@@ -89,11 +95,13 @@ struct Progress {
     iterations: usize,
     factorisations: usize,
     worst: f64,
+    pace: Pace,
 }
 
 impl Progress {
-    fn accepted(&mut self, length: u64, advance: &Advance) {
+    fn accepted(&mut self, clock: &Clock, length: u64, advance: &Advance) {
         self.ticks += length;
+        self.pace.accepted(clock.span(length));
         self.streak += 1;
         self.steps += 1;
         self.iterations += advance.iterations;
@@ -113,6 +121,7 @@ impl Progress {
             self.worst,
         ];
         state.put("march", counts);
+        self.pace.save(state);
     }
 
     fn restore(&mut self, clock: &Clock, state: &State) -> Result<()> {
@@ -125,6 +134,7 @@ impl Progress {
             iterations: counts[5] as usize,
             factorisations: counts[6] as usize,
             worst: counts[7],
+            pace: Pace::restore(state)?,
         };
         Ok(())
     }
@@ -132,6 +142,7 @@ impl Progress {
     fn report(&self, summary: &mut Summary) {
         summary.steps = self.steps;
         summary.converged = summary.stopped.is_none();
+        summary.pace = Some(self.pace.clone());
         let total = |name: &str, value: f64| (name.to_owned(), value);
         summary.numbers.extend([
             total("iterations", self.iterations as f64),
@@ -175,7 +186,7 @@ pub fn march(
         let (before, now) = (clock.at(ticks), clock.at(ticks + length));
         match model.advance(before, now) {
             Ok(advance) => {
-                progress.accepted(length, &advance);
+                progress.accepted(&clock, length, &advance);
                 if stride.is_adaptive() {
                     let old = std::mem::replace(&mut densities, model.densities());
                     stride.accepted(now, now - before, &old, &densities);
@@ -193,11 +204,13 @@ pub fn march(
             }
             Err(why) if length > clock.whole => {
                 stride.failed();
+                progress.pace.halved();
                 observer.say(&format!("t = {now:.6}: {why}; a shorter step is tried"));
             }
             Err(why) if progress.level < clock.finest => {
                 progress.level += 1;
                 progress.streak = 0;
+                progress.pace.halved();
                 let length = clock.length(progress.level);
                 observer.say(&format!("t = {now:.6}: {why}; step halved to {length:.3e}"));
             }

@@ -32,7 +32,7 @@ pub fn write(path: &Path, fingerprint: &str, state: &State) -> Result<()> {
     atomic::write(path, bytes)
 }
 
-/// Reads what [`write`] left for the scene of this fingerprint.
+/// Reads what [`write()`] left for the scene of this fingerprint.
 pub fn read(path: &Path, fingerprint: &str) -> Kept {
     let Ok(bytes) = std::fs::read(path) else {
         return Kept::Nothing;

@@ -20,6 +20,20 @@ pub fn dot<const D: usize>(x: &[[f64; D]], y: &[[f64; D]]) -> f64 {
     })
 }
 
+/// Calls `f` with each of the chunks of `values` and its first place; what it returns is added up in order.
+pub fn each_chunk<T: Send, const K: usize>(
+    values: &mut [T],
+    length: usize,
+    f: impl Fn(usize, &mut [T]) -> [f64; K] + Sync,
+) -> [f64; K] {
+    let parts: Vec<[f64; K]> = values
+        .par_chunks_mut(length)
+        .enumerate()
+        .map(|(c, chunk)| f(c * length, chunk))
+        .collect();
+    std::array::from_fn(|k| parts.iter().map(|p| p[k]).sum())
+}
+
 /// `Σ f(chunk)` over fixed chunks of `0..n`, chunk sums added in order.
 pub fn sum_chunks(n: usize, f: impl Fn(std::ops::Range<usize>) -> f64 + Sync) -> f64 {
     let chunks = n.div_ceil(CHUNK);

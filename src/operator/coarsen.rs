@@ -1,8 +1,7 @@
 //! Owns what algebraic multigrid needs of its finest level, beyond the operator itself.
 
 use super::{MixedPrecision, Operator};
-use crate::par::CHUNK;
-use rayon::prelude::*;
+use crate::par::{CHUNK, each_chunk};
 use std::ops::Range;
 
 /// The coupling of two sites: `block[a][b]` is the force on component `a` of the row's site per unit displacement of
@@ -47,16 +46,11 @@ impl<O: Coarsen> MixedPrecision for O {
         y: &mut [[f32; 3]],
         finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
     ) -> f64 {
-        let parts: Vec<f64> = y
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .map(|(c, y)| {
-                let first = c * CHUNK;
-                self.rows_f32(first..first + y.len(), x, y);
-                finish(first, y)
-            })
-            .collect();
-        parts.iter().sum()
+        let [sum] = each_chunk(y, CHUNK, |first, y| {
+            self.rows_f32(first..first + y.len(), x, y);
+            [finish(first, y)]
+        });
+        sum
     }
 
     fn each_part(
@@ -65,16 +59,10 @@ impl<O: Coarsen> MixedPrecision for O {
         out: &mut [[f32; 3]],
         take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        let parts: Vec<[f64; 2]> = out
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .map(|(c, out)| {
-                let first = c * CHUNK;
-                let mut image = vec![[0.0; 3]; out.len()];
-                self.rows_f64(first..first + out.len(), x, &mut image);
-                take(first, &image, out)
-            })
-            .collect();
-        [0, 1].map(|k| parts.iter().map(|p| p[k]).sum())
+        each_chunk(out, CHUNK, |first, out| {
+            let mut image = vec![[0.0; 3]; out.len()];
+            self.rows_f64(first..first + out.len(), x, &mut image);
+            take(first, &image, out)
+        })
     }
 }

@@ -49,7 +49,6 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         ..params.clone()
     };
     let bone = &specimen.bone;
-    let voxel = bone.grid.voxel_mm3().cbrt();
     let Some(thickness) = plate_thickness_mm(bone) else {
         // A block of bone without a surface: one element a voxel is exact.
         rows = solve(
@@ -85,11 +84,10 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         }
     }
     let elements = bone.as_slice().iter().filter(|b| **b != 0).count() as f64;
-    let size = |(coarsen, refine): (usize, usize)| voxel * coarsen as f64 / refine as f64;
-    let suffices = |pair| expected_of_pair(size(pair), thickness) <= MARGIN * target;
+    let suffices = |pair| suffices(bone, pair, thickness, target);
     let any = PAIRS.into_iter().any(suffices);
     for (coarsen, refine) in PAIRS {
-        let element = size((coarsen, refine));
+        let element = element_mm(bone, (coarsen, refine));
         // Where none can be expected to suffice, one element a voxel says how far one gets.
         if !suffices((coarsen, refine)) && (any || (coarsen, refine) != (1, 1)) {
             continue;
@@ -131,19 +129,25 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
     Ok(finish(rows, target, session))
 }
 
+/// Edge of the finer elements of a pair.
+fn element_mm(bone: &Volume<u8>, (coarsen, refine): (usize, usize)) -> f64 {
+    bone.grid.voxel_mm3().cbrt() * coarsen as f64 / refine as f64
+}
+
+/// Whether a pair is worth a try.
+fn suffices(bone: &Volume<u8>, pair: (usize, usize), thickness: f64, target: f64) -> bool {
+    expected_of_pair(element_mm(bone, pair), thickness) <= MARGIN * target
+}
+
 /// What [`solve_to`] can be expected to come to for a specimen, if lattices do not suffice: the finer voxel-FE solve of the
 /// first pair that should.
 pub fn expected(bone: &Volume<u8>, target: f64, params: &SolveParams) -> SolveParams {
-    let voxel = bone.grid.voxel_mm3().cbrt();
-    let suffices = |thickness: f64| {
-        let size = |(coarsen, refine): (usize, usize)| voxel * coarsen as f64 / refine as f64;
+    let first = |thickness| {
         PAIRS
             .into_iter()
-            .find(|pair| expected_of_pair(size(*pair), thickness) <= MARGIN * target)
+            .find(|pair| suffices(bone, *pair, thickness, target))
     };
-    let (coarsen, refine) = plate_thickness_mm(bone)
-        .and_then(suffices)
-        .unwrap_or((1, 1));
+    let (coarsen, refine) = plate_thickness_mm(bone).and_then(first).unwrap_or((1, 1));
     voxel_fe(params, coarsen, refine)
 }
 

@@ -15,7 +15,7 @@ pub mod pieces;
 mod quad;
 
 use crate::operator::{MixedPrecision, Operator};
-use crate::par::sum_chunks;
+use crate::par::{each_chunk, sum_chunks};
 use crate::simd::{Isa, isa};
 use crate::topology::sites::Sites;
 use kernel::Bonds;
@@ -306,15 +306,15 @@ impl<S: Precision> Scaled<S> {
             });
         }
         let t = &*t;
-        let parts = y.par_chunks_mut(PORTION).enumerate().map(|(c, y)| {
-            let own = range(c, y.len());
+        let [sum] = each_chunk(y, PORTION, |first, y| {
+            let own = first..first + y.len();
             match t.is_empty() {
                 true => self.springs(sites, own, u, y),
                 false => self.add_volumetric_forces(sites, own, t, y),
             }
-            finish(c * PORTION, y)
+            [finish(first, y)]
         });
-        parts.collect::<Vec<f64>>().iter().sum()
+        sum
     }
 }
 
@@ -453,18 +453,16 @@ impl MixedPrecision for Lattice<'_> {
             let springs = &mut springs[..t.len()];
             double.springs_and_pressures(sites, range(c, t.len()), x, springs, t);
         });
-        let part = |(c, out): (usize, &mut [[f32; 3]])| {
+        each_chunk(out, PORTION, |first, out| {
             let mut image = [[0.0; 3]; PORTION];
             let image = &mut image[..out.len()];
-            let own = range(c, out.len());
+            let own = first..first + out.len();
             double.springs(sites, own.clone(), x, image);
             if !t.is_empty() {
                 double.add_volumetric_forces(sites, own, &t, image);
             }
-            take(c * PORTION, image, out)
-        };
-        let parts: Vec<[f64; 2]> = out.par_chunks_mut(PORTION).enumerate().map(part).collect();
-        [0, 1].map(|k| parts.iter().map(|p| p[k]).sum())
+            take(first, image, out)
+        })
     }
 }
 

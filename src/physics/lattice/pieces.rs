@@ -7,6 +7,7 @@
 use super::{Moduli, Virial};
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::operator::{MixedPrecision, Operator};
+use crate::par::each_chunk;
 use crate::topology::pieces::Pieces;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -210,14 +211,13 @@ impl MixedPrecision for GradedLattice<'_> {
         finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
     ) -> f64 {
         let pressures = self.all_pressures(x);
-        let part = |(c, y): (usize, &mut [[f32; 3]])| {
-            for (site, y) in (c * PORTION..).zip(y.iter_mut()) {
+        let [sum] = each_chunk(y, PORTION, |first, y| {
+            for (site, y) in (first..).zip(y.iter_mut()) {
                 *y = self.row(x, &pressures, site).map(|f| f as f32);
             }
-            finish(c * PORTION, y)
-        };
-        let parts: Vec<f64> = y.par_chunks_mut(PORTION).enumerate().map(part).collect();
-        parts.iter().sum()
+            [finish(first, y)]
+        });
+        sum
     }
 
     fn each_part(
@@ -227,13 +227,11 @@ impl MixedPrecision for GradedLattice<'_> {
         take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
         let pressures = self.all_pressures(x);
-        let part = |(c, out): (usize, &mut [[f32; 3]])| {
-            let sites = c * PORTION..c * PORTION + out.len();
+        each_chunk(out, PORTION, |first, out| {
+            let sites = first..first + out.len();
             let image: Vec<[f64; 3]> = sites.map(|s| self.row(x, &pressures, s)).collect();
-            take(c * PORTION, &image, out)
-        };
-        let parts: Vec<[f64; 2]> = out.par_chunks_mut(PORTION).enumerate().map(part).collect();
-        [0, 1].map(|k| parts.iter().map(|p| p[k]).sum())
+            take(first, &image, out)
+        })
     }
 }
 

@@ -48,15 +48,13 @@ pub fn of_lattice(specimen: &Specimen, case: &Case, params: &SolveParams) -> Res
 pub fn of_voxel_fe(specimen: &Specimen, params: &SolveParams) -> f64 {
     let grid = &specimen.bone.grid;
     let differing = params.coarsen > 1 || params.material.is_some();
-    let (counts, elements_grid) = match params.coarsen {
-        1 => (Counts::of(&specimen.bone), grid.len() as f64),
+    let counts = match params.coarsen {
+        1 => Counts::of(&specimen.bone),
         factor => {
             let fractions = resample::coarsen(&specimen.bone, factor);
             let bone = fractions.as_slice().iter();
             let bone = bone.map(|f| u8::from(*f >= LEAST_FRACTION)).collect();
-            let coarse = Volume::from_vec(fractions.grid, bone);
-            // Fractions stay while elements are made of them.
-            (Counts::of(&coarse), 4.0 * coarse.grid.len() as f64)
+            Counts::of(&Volume::from_vec(fractions.grid, bone))
         }
     };
     let refine = params.refine as f64;
@@ -64,7 +62,7 @@ pub fn of_voxel_fe(specimen: &Specimen, params: &SolveParams) -> f64 {
     // Finer boxes fill in the same proportion to nodes as those of the finest count that was made.
     let boxes = counts.boxes * nodes / counts.nodes;
     let masks = if params.refine > 1 {
-        refine.powi(3) * elements_grid
+        refine.powi(3) * grid.len() as f64
     } else {
         0.0
     };

@@ -2,6 +2,7 @@
 
 mod boundaries;
 mod figures;
+mod forces;
 mod horizons;
 mod limits;
 mod local;

@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use bonepd_ct::error::Result;
 use bonepd_ct::grid::Grid;
-use bonepd_ct::io::nifti;
+use bonepd_ct::io::{map, nifti, points};
 use bonepd_ct::stage::scene::frame::{Frame, Observer};
 use bonepd_ct::stage::scene::{Inputs, Scene, run};
 use bonepd_ct::topology::plane::Points;
@@ -381,4 +381,71 @@ fn a_density_that_would_go_negative_stops_the_scene() {
         assert!(out.join("fields_t3.25.csv").exists());
         assert!((last(&out, "max") + 0.975).abs() < 1e-6);
     }
+}
+
+/// Maps and numbers of the difference to another scene: what its fields say, with its sign; other points are refused.
+#[test]
+fn differences_to_another_scene_are_those_of_the_fields() {
+    let dir = tempfile::tempdir().unwrap();
+    let start = |name: &str, radius: f64, physics: &str, more: &str| {
+        let scene = dir.path().join(format!("{name}.toml"));
+        let text = format!(
+            "geometry.disc.radius = {radius:?}\n{BODY}{more}\n[physics.{physics}]\nyoung = 100.0\n\
+             growth = {{ rate = 1.0, stimulus = 0.01 }}\n"
+        );
+        std::fs::write(&scene, text).unwrap();
+        let out = dir.path().join(name);
+        bonepd()
+            .arg("scene")
+            .arg(&scene)
+            .arg("-o")
+            .arg(&out)
+            .output()
+            .unwrap()
+    };
+    let done = start("local", 6.0, "continuum", "");
+    assert!(done.status.success(), "{done:?}");
+    let done = start("bonds", 6.0, "bond-based", "minus = 'local'");
+    assert!(done.status.success(), "{done:?}");
+    let read = |name: &str| {
+        points::read_column(
+            &dir.path().join(name).join("fields_t4.csv"),
+            "density_change",
+        )
+        .unwrap()
+    };
+    let (bonds, local) = (read("bonds"), read("local"));
+    let change: Vec<f64> = bonds.iter().zip(&local).map(|(b, l)| b.1 - l.1).collect();
+    let largest = change.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    assert!(largest > 1e-3);
+
+    let table = std::fs::read_to_string(dir.path().join("bonds/difference.csv")).unwrap();
+    let row = table.lines().find(|l| l.starts_with("4,")).unwrap();
+    let row: Vec<f64> = row.split(',').map(|v| v.parse().unwrap()).collect();
+    let n = change.len() as f64;
+    let means = [
+        change.iter().sum::<f64>() / n,
+        change.iter().map(|v| v.abs()).sum::<f64>() / n,
+    ];
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    assert!(
+        near(row[1], means[0]) && near(row[2], means[1]) && near(row[4], largest),
+        "{row:?}"
+    );
+
+    let cell = |p: &[f64; 2]| p.map(|v| (v - 0.5).round() as i32);
+    let body = Points::from_cells([0.0; 2], 1.0, bonds.iter().map(|(p, _)| cell(p)).collect());
+    let range = map::Range {
+        low: -0.3,
+        high: 0.3,
+    };
+    let drawn = image::open(dir.path().join("bonds/difference_t4.png"))
+        .unwrap()
+        .to_rgb8();
+    assert!(drawn == map::draw(&body, &change, range, 4.0));
+
+    let done = start("other", 7.0, "bond-based", "minus = 'local'");
+    let words = String::from_utf8_lossy(&done.stderr).replace('\n', " ");
+    assert_eq!(done.status.code(), Some(2), "{words}");
+    assert!(words.contains("not those of this scene"), "{words}");
 }

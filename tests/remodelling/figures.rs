@@ -23,6 +23,12 @@ fn pictures() -> PathBuf {
 #[test]
 #[ignore = "needs the scenes' results"]
 fn remodelling_report() {
+    let local = |case: &str| results().join(format!("femur-{case}-continuum")).exists();
+    assert!(
+        local("lc1") || local("lc2") || results().join("square-continuum").exists(),
+        "no scene's results in {}: run the scenes first, as reports/remodelling.md says, or name their folder in $BONEPD_OUT",
+        results().display()
+    );
     std::fs::create_dir_all(pictures()).unwrap();
     square_figures();
     for case in ["lc1", "lc2"] {
@@ -35,9 +41,20 @@ fn remodelling_report() {
             let stem = format!("{case}-minus-{horizon}");
             sheet(&scene, &stem, Some(&local));
         }
+        mean_densities(case);
         regions(case);
         differences(case);
     }
+}
+
+/// Mean relative density of the whole femur over time.
+fn mean_densities(case: &str) {
+    let local = ("local".to_owned(), format!("femur-{case}-continuum"));
+    let horizons = HORIZONS.map(|h| (format!("δ = {h}"), format!("femur-{case}-delta-{h}")));
+    curves(
+        &format!("{case}-mean"),
+        horizons.into_iter().chain([local]).collect(),
+    );
 }
 
 /// Figures 4 and 5: mean relative density over time.

@@ -1,7 +1,7 @@
 //! Peridynamics on the unit square at fixed ratio and at fixed horizon (spec A4, A5).
 
 use super::square::{
-    CONTINUOUS, S1, S2, SIX_DIGITS, Square, assert_near, continuum_square, simulate,
+    CONTINUOUS, S1, S2, SIX_DIGITS, Square, assert_near, continuum_square, local_text, simulate,
 };
 
 #[test]
@@ -203,6 +203,62 @@ fn a5_fixed_horizon_on_nearly_unit_squares() {
             let found = square.run().means([2.0, 4.0, 6.0, 8.0]);
             assert_near(found, reference, SIX_DIGITS);
         }
+    }
+}
+
+/// Shares of the neighbours' volumes (Hu's rule) in a scene: first order in delta too, towards the local limit of that stencil.
+#[test]
+fn partial_volumes_have_a_local_limit_of_their_own() {
+    let times = [2.0, 4.0, 6.0, 8.0];
+    let shared = |text: String| {
+        text.replace(
+            "horizon_ratio = 3.01",
+            "horizon_ratio = 3.01\n partial_volumes = true",
+        )
+    };
+    let strip = |n| {
+        let square = Square {
+            rows: 4,
+            ..Square::new(n, 3.01)
+        };
+        simulate(&shared(square.text())).unwrap().1.means(times)
+    };
+    let found = [10, 20, 40].map(strip);
+    let text = local_text(1, S2, false, "energy = 'stencil-bonds'");
+    let limit = simulate(&shared(text.clone())).unwrap().1.means(times);
+    let whole = simulate(&text).unwrap().1.means(times);
+    for k in 0..4 {
+        assert!((limit[k] - whole[k]).abs() > 1e-3, "{limit:?} {whole:?}");
+        let error = found.map(|f| (f[k] - limit[k]).abs());
+        let rate = 0.5 * (error[0] / error[2]).log2();
+        assert!((rate - 1.0).abs() < 0.01, "{rate}: {error:?}");
+    }
+}
+
+/// The paper's steps take Newton's method two or three iterations each, six at most.
+#[test]
+fn the_papers_steps_take_few_iterations() {
+    for (steps, most) in [(S2, 3.0), (S1, 4.0)] {
+        let square = Square {
+            steps,
+            rows: 4,
+            model: "solver = { max_iterations = 6 }",
+            ..Square::new(20, 3.01)
+        };
+        let (summary, recorder) = simulate(&square.text()).unwrap();
+        assert!(
+            summary.converged && !summary.pace.unwrap().changed(),
+            "{:?}",
+            recorder.lines
+        );
+        assert_eq!(summary.steps, 80);
+        let iterations = summary
+            .numbers
+            .iter()
+            .find(|(n, _)| n == "iterations")
+            .unwrap()
+            .1;
+        assert!(iterations <= most * 80.0, "{iterations}");
     }
 }
 

@@ -9,6 +9,7 @@ usage: tests/peers/rivals.py [CASE ...]        (default: small; see CASES below 
     lattice=LP       the shared stack (else a phantom) as SC floppy and firm lattices at nu = 1/4: LAMMPS
     protocol         bonepd-ct alone: the paper's eight lattices, the shared stack (else a phantom) from file to report
     full             bonepd-ct alone: the shared stack by voxel FE at full resolution
+    reference        the shared stack at full resolution, ends free and bonded, to 1e-7: ParOSol (half an hour)
 
 ParOSol is `parosol-py` (PyPI: pip install parosol-py, in the Python that runs this), CalculiX is `ccx` (Debian:
 calculix-ccx), LAMMPS is `lmp` (Debian: lammps). What is missing is skipped with its reason.
@@ -95,7 +96,7 @@ def voxel_fe(folder):
     return median(walls), row, float(rows(folder)[0]["e_app_mpa"])
 
 
-def parosol(mask, h, folder):
+def parosol(mask, h, folder, boundary_conditions=None):
     """Wall time, iterations and E_app (from the work of its own forces), or the reason for skipping."""
     try:
         import h5py
@@ -103,7 +104,8 @@ def parosol(mask, h, folder):
     except ImportError as e:
         return f"skipped: {e} (pip install parosol-py)"
     result = solve(material=mask * YOUNG, spacing=(h,) * 3, poisson_ratio=POISSON, strain=STRAIN, tolerance=1e-6,
-                   mpi_processes=RANKS, work_dir=folder / "parosol", outputs=("sed",), dry_run=True)
+                   mpi_processes=RANKS, work_dir=folder / "parosol", outputs=("sed",), dry_run=True,
+                   boundary_conditions=boundary_conditions)
     from parosol_py.runner import run_parosol
     command = [*result.command[:-1], result.input_file.name]
     before, used = time.monotonic(), cpu()
@@ -348,7 +350,52 @@ def full(folder, _):
           f"{float(row['algebraic_error_mpa']):.3f} MPa")
 
 
-CASES = {"small": small, "thin": thin, "stack": stack, "lattice": lattice, "protocol": protocol, "full": full}
+def sliding_ends(mask, h):
+    """Supports for ParOSol: both ends held along z only, and three values that keep the body from sliding and turning."""
+    from parosol_py.core import BoundaryConditionSet
+    nz, ny, nx = mask.shape
+    held = {}
+    for k, face, value in ((0, mask[0], 1e-16), (nz, mask[-1], STRAIN * nz * h)):
+        nodes = np.zeros((ny + 1, nx + 1), bool)
+        for dj in (0, 1):
+            for di in (0, 1):
+                nodes[dj:dj + ny, di:di + nx] |= face
+        for j, i in np.argwhere(nodes):
+            held[int(i), int(j), k, 2] = value
+        if k == 0:
+            on = np.argwhere(nodes)
+            first, far = on[0], on[np.argmax(on[:, 1] - on[0][1])]
+    # ParOSol takes a value of exactly 0 for none.
+    held[int(first[1]), int(first[0]), 0, 0] = held[int(first[1]), int(first[0]), 0, 1] = 1e-16
+    held[int(far[1]), int(far[0]), 0, 1] = 1e-16
+    places = sorted(held)
+    return BoundaryConditionSet(fixed_coordinates=np.asarray(places, np.uint16),
+                                fixed_values=np.asarray([held[p] for p in places], np.float32), node_sets={})
+
+
+def reference(folder, _):
+    if not STACK.exists():
+        print(f"reference: skipped: {STACK} is not there")
+        return
+    ours("segment", STACK, "-o", folder, *STACK_FLAGS)
+    mask, h = read_mask(folder)
+    for ends in ("free", "bonded"):
+        ours("solve", folder, "--method", "voxel-fe", "--ends", ends, "--tolerance", "1e-7", "--force")
+        row = rows(folder)[0]
+        print(f"\nreference, ends {ends}: {int(row['sites']):,} hexahedra, {int(row['unknowns']):,} unknowns\n"
+              f"  bonepd-ct E_app {float(row['e_app_mpa']):.4f} MPa", flush=True)
+        try:
+            found = parosol(mask, h, folder, sliding_ends(mask, h) if ends == "free" else None)
+        except ImportError as e:
+            found = f"skipped: {e} (pip install parosol-py)"
+        if isinstance(found, str):
+            print(f"  ParOSol   {found}")
+        else:
+            (wall, used), iterations, e = found
+            print(f"  ParOSol   E_app {e:.4f} MPa, {iterations} iterations, {wall:.1f} s, {used:.1f} CPU s", flush=True)
+
+
+CASES = {"reference": reference, "small": small, "thin": thin, "stack": stack, "lattice": lattice, "protocol": protocol, "full": full}
 
 
 def main():

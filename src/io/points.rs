@@ -36,13 +36,21 @@ pub fn write_csv(path: &Path, points: &Points, fields: &[Field]) -> Result<()> {
 
 /// Positions and one named column of a file that [`write_csv`] wrote.
 pub fn read_column(path: &Path, name: &str) -> Result<Vec<([f64; 2], f64)>> {
-    let bad = |found: String| {
-        Error::file(
-            path,
-            found,
-            "name the output folder of another scene with the same points",
-        )
-    };
+    read_rows(
+        path,
+        name,
+        "name the output folder of another scene with the same points",
+    )
+}
+
+/// Positions of such a file.
+pub fn read_positions(path: &Path) -> Result<Vec<[f64; 2]>> {
+    let rows = read_column(path, "y")?;
+    Ok(rows.into_iter().map(|(position, _)| position).collect())
+}
+
+fn read_rows(path: &Path, name: &str, advice: &str) -> Result<Vec<([f64; 2], f64)>> {
+    let bad = |found: String| Error::file(path, found, advice);
     let mut reader =
         csv::Reader::from_path(path).map_err(|e| bad(format!("cannot be read: {e}")))?;
     let header = reader.headers().map_err(|e| bad(e.to_string()))?.clone();
@@ -67,13 +75,11 @@ pub fn read_column(path: &Path, name: &str) -> Result<Vec<([f64; 2], f64)>> {
 
 /// The corners of a polygon: columns `x` and `y`.
 pub fn read_corners(path: &Path) -> Result<Vec<[f64; 2]>> {
-    let rows = read_column(path, "y").map_err(|e| {
-        Error::file(
-            path,
-            format!("is no list of corners: {e}"),
-            "give a CSV file with columns x,y",
-        )
-    })?;
+    let rows = read_rows(
+        path,
+        "y",
+        "give the corners of an outline as a CSV file with columns x,y",
+    )?;
     Ok(rows.into_iter().map(|(corner, _)| corner).collect())
 }
 

@@ -3,6 +3,7 @@
 
 mod differences;
 mod inputs;
+mod stale;
 mod writer;
 
 use crate::error::{Error, Result};
@@ -10,7 +11,7 @@ use crate::io::atomic;
 use crate::run::Outcome;
 use crate::run::session::Session;
 use crate::stage::scene::frame::Summary;
-use crate::stage::scene::{Inputs, Scene, run};
+use crate::stage::scene::{Inputs, Scene, check, run};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -41,10 +42,10 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
     })?;
     let mut scene = Scene::parse(&text, path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut inputs = inputs::read(&mut scene, folder)?;
+    let mut inputs = inputs::read(&mut scene, folder, |line| session.warn(line))?;
     inputs.stiffness = inputs::read_stiffness(&scene, folder)?;
     if session.dry_run {
-        let points = scene.points(&inputs)?;
+        let points = check(&scene, &inputs)?;
         session.say(format!(
             "{}: {} points; results would go to {}",
             scene.title,
@@ -57,6 +58,9 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
     let begun = Instant::now();
     let fingerprint = fingerprint(&scene, &inputs);
     let mut writer = Writer::new(out, &scene.output, folder, fingerprint, session);
+    if !writer.goes_on() {
+        stale::clear(out)?;
+    }
     let summary = run(&scene, &inputs, &mut writer)?;
     writer.finish()?;
     let record = SceneRecord {

@@ -129,6 +129,14 @@ impl Scene {
         Ok(points)
     }
 
+    /// # Errors
+    /// A scene that marches through time without `[time]`.
+    fn marching_time(&self) -> Result<&Time> {
+        self.time
+            .as_ref()
+            .ok_or_else(|| Error::setting("time", "missing", "give [time] end and step"))
+    }
+
     /// The full neighbourhood. Refused where the scene gives no horizon, or two.
     pub fn stencil(&self) -> Result<Stencil> {
         let grid = &self.grid;
@@ -148,8 +156,21 @@ impl Scene {
     }
 }
 
+/// Refuses what a run would refuse before its first step; of continuum-molecular scenes, what their geometry shows. The
+/// material points.
+pub fn check(scene: &Scene, inputs: &Inputs) -> Result<Points> {
+    scene.output.check()?;
+    match &scene.physics {
+        Physics::BondBased(params) => bond_based::check(scene, params, inputs)?,
+        Physics::Continuum(params) => continuum::check(scene, params, inputs)?,
+        Physics::ContinuumMolecular(_) => {}
+    }
+    scene.points(inputs)
+}
+
 /// Runs a scene, reporting states to `observer` as they are accepted.
 pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Result<Summary> {
+    scene.output.check()?;
     match &scene.physics {
         Physics::BondBased(params) => bond_based::run(scene, params, inputs, observer),
         Physics::Continuum(params) => continuum::run(scene, params, inputs, observer),

@@ -99,7 +99,16 @@ impl Outline {
             Outline::Rectangle(shape) => shape.points(spacing),
             Outline::Disc(shape) => shape.points(spacing),
             Outline::Polygon(shape) => shape.points(spacing),
-            Outline::Image(shape) => bitmap_points(shape.origin, spacing, bitmap),
+            Outline::Image(shape) => {
+                if let Some(wrong) = shape.origin.iter().find(|v| !v.is_finite()) {
+                    return Err(Error::setting(
+                        "geometry.image.origin",
+                        format!("found {wrong}"),
+                        "give finite coordinates",
+                    ));
+                }
+                bitmap_points(shape.origin, spacing, bitmap)
+            }
             Outline::Slice(_) => bitmap_points([0.0; 2], spacing, bitmap),
         }
     }
@@ -109,6 +118,7 @@ impl Rectangle {
     fn points(&self, spacing: f64) -> Result<Points> {
         let mut n = [0; 2];
         for (n, size) in n.iter_mut().zip(self.size) {
+            require_positive("geometry.rectangle.size", size)?;
             let cells = size / spacing;
             let whole = cells.round();
             if !(1.0..1e5).contains(&whole) || (cells - whole).abs() > 1e-6 * whole {

@@ -165,7 +165,7 @@ impl Points {
         piece.iter().for_each(|&p| sizes[p as usize] += 1);
         let keep = (0..count).rev().max_by_key(|&p| sizes[p]).unwrap_or(0) as u32;
         let kept = self.cells.iter().zip(&piece).filter(|(_, p)| **p == keep);
-        Points::from_cells(self.origin, self.spacing, kept.map(|(c, _)| *c).collect())
+        self.of(kept.map(|(c, _)| *c).collect())
     }
 
     /// Only the points that belong to a square of four neighbouring points.
@@ -179,7 +179,15 @@ impl Points {
             .cells
             .iter()
             .filter(|c| corners.iter().any(|&d| square(**c, d)));
-        Points::from_cells(self.origin, self.spacing, kept.copied().collect())
+        self.of(kept.copied().collect())
+    }
+
+    /// Some of these points, as they lie.
+    fn of(&self, cells: Vec<[i32; 2]>) -> Points {
+        Points {
+            on_edges: self.on_edges,
+            ..Points::from_cells(self.origin, self.spacing, cells)
+        }
     }
 
     fn slot(&self, cell: [i32; 2]) -> Option<usize> {
@@ -205,6 +213,16 @@ mod tests {
         assert!(message.contains("2 unconnected pieces"), "{message}");
         assert_eq!(two.largest_piece().len(), 2);
         assert!(two.largest_piece().require_one_piece().is_ok());
+    }
+
+    #[test]
+    fn what_drops_nothing_changes_nothing() {
+        let mut points = Points::from_box([0.0; 2], 1.0, [3, 3], |_| true);
+        points.on_edges = true;
+        for same in [points.largest_piece(), points.pruned()] {
+            assert_eq!(same.cells, points.cells);
+            assert!(same.on_edges);
+        }
     }
 
     #[test]

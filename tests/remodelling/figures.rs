@@ -3,6 +3,8 @@
 
 use bonepd_ct::io::{map, plot, points};
 use bonepd_ct::stage::report::figure::{Axis, Content, Curve, Figure, Mark, Point};
+use bonepd_ct::stage::scene::Scene;
+use bonepd_ct::stage::scene::conditions::Region;
 use bonepd_ct::topology::plane::Points;
 use image::{RgbImage, imageops};
 use std::path::{Path, PathBuf};
@@ -31,6 +33,7 @@ fn remodelling_report() {
     );
     std::fs::create_dir_all(pictures()).unwrap();
     square_figures();
+    last_states();
     for case in ["lc1", "lc2"] {
         let name = |kind: &str| format!("femur-{case}-{kind}");
         let local = name("continuum");
@@ -129,79 +132,113 @@ fn densities(scene: &str, t: u32) -> Option<Vec<([f64; 2], f64)>> {
         .then(|| points::read_column(&file, "density_change").unwrap())
 }
 
-/// Four times side by side, of densities or of their difference to another scene.
-fn sheet(scene: &str, stem: &str, minus: Option<&str>) {
-    let panel = |t: u32| {
-        let mut rows = densities(scene, t)?;
-        if let Some(other) = minus {
-            let other = densities(other, t)?;
-            rows.iter_mut().zip(&other).for_each(|(a, b)| a.1 -= b.1);
-        }
-        let cell = |p: &[f64; 2]| p.map(|v| (v / SPACING - 0.5).round() as i32);
-        let cells = rows.iter().map(|(p, _)| cell(p)).collect();
-        let values: Vec<f64> = rows.iter().map(|r| r.1).collect();
-        let size = if minus.is_some() { 0.3 } else { 1.0 };
-        let range = map::Range {
-            low: -size,
-            high: size,
-        };
-        let points = Points::from_cells([0.0; 2], SPACING, cells);
-        let full = map::draw(&points, &values, range, f64::from(t));
-        let half = [full.width() / 2, full.height() / 2];
-        Some(imageops::resize(
-            &full,
-            half[0],
-            half[1],
-            imageops::FilterType::Nearest,
-        ))
+/// The picture of a scene at a time: its densities, or their difference to another scene.
+fn panel(scene: &str, minus: Option<&str>, t: u32) -> Option<RgbImage> {
+    let mut rows = densities(scene, t)?;
+    if let Some(other) = minus {
+        let other = densities(other, t)?;
+        rows.iter_mut().zip(&other).for_each(|(a, b)| a.1 -= b.1);
+    }
+    let values: Vec<f64> = rows.iter().map(|r| r.1).collect();
+    let size = if minus.is_some() { 0.3 } else { 1.0 };
+    let range = map::Range {
+        low: -size,
+        high: size,
     };
-    let panels: Vec<RgbImage> = TIMES.iter().filter_map(|t| panel(*t)).collect();
-    let (Some(first), true) = (panels.first(), panels.len() == TIMES.len()) else {
+    let full = map::draw(&points_of(&rows), &values, range, f64::from(t));
+    let [w, h] = [full.width() / 2, full.height() / 2];
+    Some(imageops::resize(&full, w, h, imageops::FilterType::Nearest))
+}
+
+fn points_of(rows: &[([f64; 2], f64)]) -> Points {
+    let cell = |p: &[f64; 2]| p.map(|v| (v / SPACING - 0.5).round() as i32);
+    Points::from_cells(
+        [0.0; 2],
+        SPACING,
+        rows.iter().map(|(p, _)| cell(p)).collect(),
+    )
+}
+
+/// Panels row by row into one picture; nothing where one is missing.
+fn put_together(stem: &str, rows: &[Vec<Option<RgbImage>>]) {
+    let Some(panels) = rows
+        .iter()
+        .map(|r| r.iter().cloned().collect())
+        .collect::<Option<Vec<Vec<_>>>>()
+    else {
         return;
     };
-    let (w, h) = first.dimensions();
-    let mut all = RgbImage::new(w * panels.len() as u32, h);
-    for (k, panel) in panels.iter().enumerate() {
-        imageops::replace(&mut all, panel, i64::from(w) * k as i64, 0);
+    let (w, h) = panels[0][0].dimensions();
+    let mut all = RgbImage::new(w * panels[0].len() as u32, h * panels.len() as u32);
+    for (j, row) in panels.iter().enumerate() {
+        for (i, panel) in row.iter().enumerate() {
+            imageops::replace(
+                &mut all,
+                panel,
+                i64::from(w) * i as i64,
+                i64::from(h) * j as i64,
+            );
+        }
     }
     map::write_png(&pictures().join(format!("{stem}.png")), &all).unwrap();
 }
 
-/// Mean (5 %, 95 %) of each region at t = 10 and 280 in every scene of a load case.
-fn regions(case: &str) {
-    const REGIONS: [&str; 10] = [
-        "",
-        "medial_shaft.",
-        "lateral_shaft.",
-        "shaft_core.",
-        "principal_compressive.",
-        "principal_tensile.",
-        "wards_triangle.",
-        "intertrochanteric.",
-        "greater_trochanter.",
-        "head.",
-    ];
-    let kinds = ["continuum".to_owned()].into_iter();
-    let kinds: Vec<String> = kinds
+/// Four times side by side, of densities or of their difference to another scene.
+fn sheet(scene: &str, stem: &str, minus: Option<&str>) {
+    put_together(stem, &[TIMES.map(|t| panel(scene, minus, t)).to_vec()]);
+}
+
+/// As Figure 11: the last state of all models, load case 1 above load case 2.
+fn last_states() {
+    let rows = ["lc1", "lc2"].map(|case| {
+        let scenes = kinds()
+            .into_iter()
+            .map(|kind| format!("femur-{case}-{kind}"));
+        scenes.map(|scene| panel(&scene, None, TIMES[3])).collect()
+    });
+    put_together("last-states", &rows);
+}
+
+/// The continuum, then the four horizons.
+fn kinds() -> Vec<String> {
+    let local = ["continuum".to_owned()].into_iter();
+    local
         .chain(HORIZONS.map(|h| format!("delta-{h}")))
-        .collect();
-    for t in [10.0, 280.0] {
-        println!("\n{case}, t = {t}\n\n| | {} |", kinds.join(" | "));
-        println!("|---|{}", "---|".repeat(kinds.len()));
-        for region in REGIONS {
+        .collect()
+}
+
+/// Mean (5 %, 95 %) of each region at t = 10 and 280 in every scene of a load case, all points weighing alike: at the
+/// continuum's nodes, too, which sit where the material points do.
+fn regions(case: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join(format!("pipelines/femur-{case}-continuum.toml"));
+    let scene = Scene::parse(&std::fs::read_to_string(&path).unwrap(), &path).unwrap();
+    let regions = || {
+        let named = scene
+            .probe
+            .iter()
+            .map(|p| (p.name.as_str(), p.region.clone()));
+        std::iter::once(("whole", Region::All)).chain(named)
+    };
+    for t in [10, 280] {
+        println!("\n{case}, t = {t}\n\n| | {} |", kinds().join(" | "));
+        println!("|---|{}", "---|".repeat(kinds().len()));
+        for (name, region) in regions() {
             let cell = |kind: &String| {
-                let at = |what: &str| {
-                    let all = column(&format!("femur-{case}-{kind}"), &format!("{region}{what}"))?;
-                    let row = all.into_iter().find(|(time, _)| (time - t).abs() < 1e-6)?;
-                    Some(row.1)
+                let Some(rows) = densities(&format!("femur-{case}-{kind}"), t) else {
+                    return "-".to_owned();
                 };
-                match (at("mean"), at("p05"), at("p95")) {
-                    (Some(m), Some(a), Some(b)) => format!("{m:.3} ({a:.3}, {b:.3})"),
-                    _ => "-".to_owned(),
-                }
+                let chosen = region
+                    .select(&points_of(&rows), rows.len(), "probe")
+                    .unwrap();
+                let mut values: Vec<f64> = chosen.iter().map(|&p| rows[p].1).collect();
+                values.sort_unstable_by(f64::total_cmp);
+                let mean = values.iter().sum::<f64>() / values.len() as f64;
+                let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
+                format!("{mean:.3} ({:.3}, {:.3})", at(0.05), at(0.95))
             };
-            let row: Vec<String> = kinds.iter().map(cell).collect();
-            println!("| {} | {} |", region.trim_end_matches('.'), row.join(" | "));
+            let row: Vec<String> = kinds().iter().map(cell).collect();
+            println!("| {name} | {} |", row.join(" | "));
         }
     }
 }

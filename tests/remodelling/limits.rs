@@ -1,6 +1,6 @@
 //! What remodelling scenes refuse, and how they stop.
 
-use super::square::{Square, simulate};
+use super::square::{S2, Square, local_text, simulate};
 
 #[test]
 fn a7_noise_settles_where_n_is_below_m_and_n_not_below_m_is_refused() {
@@ -18,8 +18,10 @@ fn a7_noise_settles_where_n_is_below_m_and_n_not_below_m_is_refused() {
         let (summary, recorder) = simulate(&noisy(exponent)).unwrap();
         assert!(summary.converged);
         // Settled: the last time unit changes nothing.
-        let drift = recorder.at(6.0, "mean") - recorder.at(5.0, "mean");
-        assert!(drift.abs() < 1e-6, "n = {exponent}: {drift}");
+        for number in ["mean", "min", "max"] {
+            let drift = recorder.at(6.0, number) - recorder.at(5.0, number);
+            assert!(drift.abs() < 1e-6, "n = {exponent}, {number}: {drift}");
+        }
     }
     for exponent in [3.0, 3.5, 4.0] {
         let words = simulate(&noisy(exponent))
@@ -45,6 +47,49 @@ fn unknowns_per_point() {
     let (elastic, recorder) = simulate(&elastic).unwrap();
     assert_eq!(elastic.unknowns, 2 * 100 - 1);
     assert_eq!(recorder.at(0.1, "max"), 0.0);
+    // The continuum: nine nodes, six of them held along y, one along x; densities at nodes, at Gauss points, or nowhere.
+    let local = local_text(2, S2, false, "");
+    let at_gauss = local_text(2, S2, false, "density_at = 'gauss'");
+    let rigid = local.replace("growth = { rate = 1000, stimulus = 0.01 }", "");
+    for (text, unknowns) in [
+        (local, 3 * 9 - 7),
+        (at_gauss, 2 * 9 - 7),
+        (rigid, 2 * 9 - 7),
+    ] {
+        let text = text.replace("end = 8.0", "end = 0.1");
+        assert_eq!(simulate(&text).unwrap().0.unknowns, unknowns);
+    }
+}
+
+/// Edges that hold a nodal rectangle stay edges, whatever is dropped from it; a hold's edge is the body's, not that of the
+/// layers beyond it.
+#[test]
+fn what_drops_nothing_changes_nothing() {
+    let plain = Square {
+        end: 2.0,
+        ..Square::new(10, 3.01)
+    }
+    .text()
+    .replace("[grid]", "geometry.rectangle.nodal = true\n[grid]");
+    let found = |text: &str| {
+        let (summary, recorder) = simulate(text).unwrap();
+        (summary.unknowns, recorder.means([2.0]))
+    };
+    let reference = found(&plain);
+    for key in ["keep_largest", "prune"] {
+        let text = plain.replace("[grid]", &format!("[grid]\n{key} = true"));
+        assert_eq!(found(&text), reference, "{key}");
+    }
+    let held = |region: &str| {
+        let text = Square {
+            end: 2.0,
+            ..Square::new(10, 3.01)
+        }
+        .text();
+        found(&text.replace("{ point = [0, 0] }", region)).0
+    };
+    assert_eq!(held("{ edge = 'bottom' }"), 3 * 100 - 10);
+    assert_eq!(held("{ point = [0.0, 0.56] }"), 3 * 100 - 1);
 }
 
 #[test]
@@ -166,6 +211,37 @@ fn what_cannot_work_is_refused_in_words() {
             "give a positive one",
         ),
         (with("step = 0.1", "step = 0.3"), "whole number of steps"),
+        (
+            with("edges = ['bottom', 'top']", "edges = ['top', 'top']"),
+            "two opposite edges",
+        ),
+        (
+            with("component = 'x'", "component = 'x'\n value = nan"),
+            "give finite numbers",
+        ),
+        (
+            with("[time]", "[output]\n every = 0\n [time]"),
+            "output.every",
+        ),
+        (
+            with("[time]", "[output]\n range = [1, -1]\n [time]"),
+            "the lowest value, then the highest",
+        ),
+        (
+            with("[time]", "[output]\n times = [nan]\n [time]"),
+            "output.times",
+        ),
+        (
+            with(
+                "[time]",
+                "[[probe]]\n name = 'a,b'\n region = 'all'\n [time]",
+            ),
+            "probe[0].name",
+        ),
+        (
+            with("size = [1.0, 1.0]", "size = [nan, 1.0]"),
+            "expected a positive length",
+        ),
     ];
     for (words, expected) in cases {
         assert!(words.contains(expected), "{words}");

@@ -5,46 +5,104 @@ use crate::error::{Error, Result};
 use crate::io::map::{self, Range};
 use crate::io::{atomic, points as files};
 use crate::topology::plane::Points;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Writes the first of each time's `maps` less that of another run on the same points, at the times both have.
-pub fn write(out: &Path, maps: &[(f64, Scalars)], points: &Points, other: &Path) -> Result<()> {
-    let mut rows =
-        vec!["t,mean,mean_abs,p95_abs,max_abs,share_above_0.1,share_above_0.3".to_owned()];
-    for (t, scalars) in maps {
-        let Some((name, values)) = scalars.first() else {
-            continue;
+/// Times nearer than this, relative to their size, are the same.
+const SAME_TIME: f64 = 1e-9;
+
+/// The fields that another scene left.
+pub struct Other {
+    folder: PathBuf,
+    /// Times, and the file of each.
+    files: Vec<(f64, PathBuf)>,
+}
+
+impl Other {
+    /// # Errors
+    /// A folder without fields, or with those of other points.
+    pub fn open(folder: &Path, points: &Points) -> Result<Self> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let mut files: Vec<_> = entries
+            .filter_map(|e| Some((time_of(&e.file_name().to_string_lossy())?, e.path())))
+            .collect();
+        files.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, first)) = files.first() else {
+            return Err(Error::file(
+                folder,
+                "output.minus names it, but it holds no fields (fields_t*.csv) of a scene",
+                "run that scene first, or correct output.minus",
+            ));
         };
-        let file = other.join(format!("fields_t{t}.csv"));
-        if !file.exists() {
-            continue;
-        }
-        let minus = files::read_column(&file, name)?;
+        let found = files::read_positions(first)?;
         let near = |p: usize| {
-            let (at, here) = (minus[p].0, points.position(p));
+            let (at, here) = (found[p], points.position(p));
             (0..2).all(|d| (at[d] - here[d]).abs() < 1e-6 * points.spacing)
         };
-        if minus.len() != points.len() || !(0..points.len()).all(near) {
+        if found.len() != points.len() || !(0..points.len()).all(near) {
             return Err(Error::file(
-                file,
+                first,
                 "its points are not those of this scene",
                 "compare scenes of one geometry and spacing",
             ));
         }
+        Ok(Other {
+            folder: folder.to_path_buf(),
+            files,
+        })
+    }
+
+    fn at(&self, t: f64) -> Option<&Path> {
+        let same = |other: f64| (other - t).abs() <= SAME_TIME * t.abs().max(other.abs());
+        let found = self.files.iter().find(|(other, _)| same(*other))?;
+        Some(&found.1)
+    }
+}
+
+/// The time in a name `fields_t{time}.csv`.
+pub fn time_of(name: &str) -> Option<f64> {
+    name.strip_prefix("fields_t")?
+        .strip_suffix(".csv")?
+        .parse()
+        .ok()
+}
+
+/// Writes the first of each time's `maps` less that of the other scene, at the times both have. Words for the times that
+/// the other has not.
+pub fn write(
+    out: &Path,
+    maps: &[(f64, Scalars)],
+    points: &Points,
+    other: &Other,
+) -> Result<Option<String>> {
+    let mut rows =
+        vec!["t,mean,mean_abs,p95_abs,max_abs,share_above_0.1,share_above_0.3".to_owned()];
+    let mut missing = Vec::new();
+    for (t, scalars) in maps {
+        let Some((name, values)) = scalars.first() else {
+            continue;
+        };
+        let Some(file) = other.at(*t) else {
+            missing.push(t.to_string());
+            continue;
+        };
+        let minus = files::read_column(file, name)?;
         let change: Vec<f64> = values.iter().zip(&minus).map(|(a, (_, b))| a - b).collect();
         rows.push(difference_row(*t, &change));
-        let picture = map::draw(
-            points,
-            &change,
-            Range {
-                low: -0.3,
-                high: 0.3,
-            },
-            *t,
-        );
+        let range = Range {
+            low: -0.3,
+            high: 0.3,
+        };
+        let picture = map::draw(points, &change, range, *t);
         map::write_png(&out.join(format!("difference_t{t}.png")), &picture)?;
     }
-    atomic::write(&out.join("difference.csv"), rows.join("\n") + "\n")
+    atomic::write(&out.join("difference.csv"), rows.join("\n") + "\n")?;
+    Ok((!missing.is_empty()).then(|| {
+        format!(
+            "no difference at t = {}: {} has no fields of that time",
+            missing.join(", "),
+            other.folder.display()
+        )
+    }))
 }
 
 /// A line of `difference.csv`.

@@ -1,6 +1,6 @@
 //! Owns what a running scene leaves on disk: history, fields, maps, the animation, and the state to go on from.
 
-use super::differences;
+use super::differences::{self, Other};
 use crate::error::{Error, Result};
 use crate::io::map::{self, Range};
 use crate::io::state::{self, Kept};
@@ -25,7 +25,9 @@ const EVERY: Duration = Duration::from_secs(10);
 pub struct Writer<'a> {
     out: &'a Path,
     output: &'a Output,
+    /// Folder of the scene to compare with, then its fields.
     minus: Option<PathBuf>,
+    other: Option<Other>,
     session: &'a Session,
     bar: ProgressBar,
     points: Option<Points>,
@@ -51,6 +53,7 @@ impl<'a> Writer<'a> {
             out,
             output,
             minus: output.minus.as_ref().map(|p| folder.join(p)),
+            other: None,
             session,
             bar: ProgressBar::hidden(),
             points: None,
@@ -80,6 +83,7 @@ impl<'a> Writer<'a> {
     }
 
     fn write_fields(&mut self, frame: &Frame) -> Result<()> {
+        self.check_maps(&frame.fields)?;
         let Some(points) = &self.points else {
             return Ok(());
         };
@@ -96,6 +100,26 @@ impl<'a> Writer<'a> {
         let file = |t: f64| (self.out.join(format!("fields_t{t}.vtk")), t);
         let series: Vec<_> = self.maps.iter().map(|(t, _)| file(*t)).collect();
         files::write_series(&self.out.join("fields.vtk.series"), &series)
+    }
+
+    /// # Errors
+    /// A map of a field that there is not.
+    fn check_maps(&self, fields: &[Field]) -> Result<()> {
+        let scalar = |f: &&Field| matches!(f.values, Values::Scalar(_));
+        let there: Vec<&str> = fields.iter().filter(scalar).map(|f| f.name).collect();
+        match self
+            .output
+            .maps
+            .iter()
+            .find(|m| !there.contains(&m.as_str()))
+        {
+            None => Ok(()),
+            Some(wrong) => Err(Error::setting(
+                "output.maps",
+                format!("found \"{wrong}\""),
+                format!("this scene has {}", there.join(", ")),
+            )),
+        }
     }
 
     fn scalars(&self, fields: &[Field]) -> Scalars {
@@ -147,10 +171,12 @@ impl<'a> Writer<'a> {
             }
         }
         self.draw_curves()?;
-        match self.minus.clone() {
-            Some(other) => differences::write(self.out, &self.maps, &points, &other),
-            None => Ok(()),
+        if let Some(other) = &self.other
+            && let Some(words) = differences::write(self.out, &self.maps, &points, other)?
+        {
+            self.session.warn(words);
         }
+        Ok(())
     }
 
     fn draw_curves(&self) -> Result<()> {
@@ -186,6 +212,12 @@ impl<'a> Writer<'a> {
 impl Writer<'_> {
     fn state_path(&self) -> PathBuf {
         self.out.join(STATE)
+    }
+
+    /// Whether this very scene was stopped here before.
+    pub fn goes_on(&self) -> bool {
+        let kept = || state::read(&self.state_path(), &self.fingerprint);
+        !self.session.force && matches!(kept(), Kept::State(_))
     }
 
     /// A finished scene has nothing to go on from.
@@ -232,6 +264,9 @@ const MAP: &str = "writer.map.";
 
 impl Observer for Writer<'_> {
     fn start(&mut self, points: &Points, steps: usize) -> Result<()> {
+        if let Some(folder) = &self.minus {
+            self.other = Some(Other::open(folder, points)?);
+        }
         self.points = Some(points.clone());
         self.bar = self.session.bar(steps as u64, "scene");
         Ok(())
@@ -242,6 +277,14 @@ impl Observer for Writer<'_> {
             fields: Vec::new(),
             ..frame.clone()
         };
+        // A scene that stops tells of its last good state once more, with fields.
+        if self
+            .history
+            .last()
+            .is_some_and(|last| last.time == row.time)
+        {
+            self.history.pop();
+        }
         self.history.push(row);
         if !frame.fields.is_empty() {
             self.write_history()?;

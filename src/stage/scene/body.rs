@@ -44,14 +44,13 @@ pub struct Conditions<'a> {
 impl Body {
     pub fn new(material: Points, conditions: Conditions) -> Result<Self> {
         let count = material.len();
-        let on_edges = material.on_edges;
         let (points, fictitious) = match conditions.layers {
             Some(layers) => {
                 check_layers(layers)?;
                 let depth = layers.depth.unwrap_or(conditions.reach);
                 add_layers(&material, &layers.edges, depth)?
             }
-            None => (material, Vec::new()),
+            None => (material.clone(), Vec::new()),
         };
         let mut density = conditions.density;
         for f in &fictitious {
@@ -74,21 +73,22 @@ impl Body {
             density,
             points,
         };
-        body.held = body.find_held()?;
-        body.on_edge = body.edge_rows(on_edges);
+        body.held = body.find_held(&material)?;
+        body.on_edge = body.edge_rows(material.on_edges);
         body.extents = [body.extent(0), body.extent(1)];
         body.map = Reduction::new(&body.roles(conditions.grows));
         body.require_support()?;
         Ok(body)
     }
 
-    fn find_held(&self) -> Result<Vec<(usize, f64, usize)>> {
+    /// Regions are of the material: fictitious points, which come after it, are no part of its edges.
+    fn find_held(&self, material: &Points) -> Result<Vec<(usize, f64, usize)>> {
         let mut held = Vec::new();
         for (k, hold) in self.holds.iter().enumerate() {
             let key = format!("hold[{k}].region");
             hold.value.check(&format!("hold[{k}].value"))?;
             let axis = axis_of(&hold.component, &format!("hold[{k}].component"))?;
-            for p in hold.region.select(&self.points, self.material, &key)? {
+            for p in hold.region.select(material, material.len(), &key)? {
                 held.push((self.placement(p, axis), self.points.position(p)[axis], k));
             }
         }
@@ -227,7 +227,8 @@ impl Body {
 fn check_layers(layers: &Layers) -> Result<()> {
     layers.displacement.check("layers.displacement")?;
     let axes: Vec<usize> = layers.edges.iter().map(|e| e.normal().0).collect();
-    if axes.is_empty() || axes.iter().any(|&a| a != axes[0]) {
+    let twice = layers.edges.len() > 1 && layers.edges[1..].contains(&layers.edges[0]);
+    if axes.is_empty() || axes.iter().any(|&a| a != axes[0]) || axes.len() > 2 || twice {
         return Err(Error::setting(
             "layers.edges",
             "expected one edge or two opposite edges",

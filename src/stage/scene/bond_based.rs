@@ -9,7 +9,7 @@ use crate::solve::newton::NotConverged;
 use crate::stage::scene::body::{Body, Conditions, NUDGE, nudge, rate_of};
 use crate::stage::scene::density::{DensityParams, GrowthParams, Probes};
 use crate::stage::scene::frame::{Frame, Observer, Summary};
-use crate::stage::scene::march::{Advance, Marching, march};
+use crate::stage::scene::march::{self, Advance, Marching, march};
 use crate::stage::scene::solver::{Equilibrium, SolverParams, Stamp};
 use crate::stage::scene::state::State;
 use crate::stage::scene::{Inputs, Scene};
@@ -45,6 +45,12 @@ pub enum Micromodulus {
     Finite(f64),
 }
 
+/// Refuses what [`run`] would refuse before its first step.
+pub fn check(scene: &Scene, params: &BondBasedParams, inputs: &Inputs) -> Result<()> {
+    Peridynamic::new(scene, params, inputs)?;
+    march::check(scene.marching_time()?)
+}
+
 /// Runs the scene.
 pub fn run(
     scene: &Scene,
@@ -53,13 +59,7 @@ pub fn run(
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     let mut model = Peridynamic::new(scene, params, inputs)?;
-    let Some(time) = &scene.time else {
-        return Err(Error::setting(
-            "time",
-            "missing",
-            "give [time] end and step",
-        ));
-    };
+    let time = scene.marching_time()?;
     let mut summary = model.summary();
     observer.start(
         &scene.points(inputs)?,

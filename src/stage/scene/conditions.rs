@@ -127,14 +127,20 @@ impl Schedule {
             Schedule::Steps(s) => (&s.until, &s.values),
         };
         let ascend = times.windows(2).all(|w| w[0] < w[1]);
-        let finite = times.iter().chain(values).all(|v| v.is_finite());
-        if times.len() == values.len() && !times.is_empty() && ascend && finite {
+        if let Some(wrong) = times.iter().chain(values).find(|v| !v.is_finite()) {
+            return Err(Error::setting(
+                key,
+                format!("found {wrong}"),
+                "give finite numbers",
+            ));
+        }
+        if times.len() == values.len() && !times.is_empty() && ascend {
             return Ok(());
         }
         Err(Error::setting(
             key,
             format!(
-                "expected as many finite values as ascending times, found {} and {}",
+                "expected as many values as ascending times, found {} and {}",
                 values.len(),
                 times.len()
             ),
@@ -143,7 +149,8 @@ impl Schedule {
     }
 }
 
-/// A prescribed value: displacement, temperature, potential, whatever the physics calls `component`.
+/// A prescribed value: displacement, temperature, potential, whatever the physics calls `component`. Where two holds of one
+/// component meet, the later one of the file holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hold {

@@ -12,10 +12,16 @@ use crate::stage::scene::body::{Body, Conditions, NUDGE, nudge, rate_of};
 use crate::stage::scene::density::Probes;
 use crate::stage::scene::frame::{Frame, Observer, Summary};
 use crate::stage::scene::loads::Loads;
-use crate::stage::scene::march::{Advance, Marching, march};
+use crate::stage::scene::march::{self, Advance, Marching, march};
 use crate::stage::scene::solver::{Equilibrium, Stamp};
 use crate::stage::scene::state::State;
 use crate::stage::scene::{Inputs, Scene};
+
+/// Refuses what [`run`] would refuse before its first step.
+pub fn check(scene: &Scene, params: &ContinuumParams, inputs: &Inputs) -> Result<()> {
+    Local::new(scene, params, inputs)?;
+    march::check(scene.marching_time()?)
+}
 
 /// Runs the scene.
 pub fn run(
@@ -25,13 +31,7 @@ pub fn run(
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     let mut model = Local::new(scene, params, inputs)?;
-    let Some(time) = &scene.time else {
-        return Err(Error::setting(
-            "time",
-            "missing",
-            "give [time] end and step",
-        ));
-    };
+    let time = scene.marching_time()?;
     let mut summary = Summary {
         points: model.body.material,
         unknowns: model.body.map.unknowns(),

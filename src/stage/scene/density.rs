@@ -175,11 +175,27 @@ impl DensityParams {
                 "take a slice of a scan (geometry.slice with grey), or an image",
             ));
         };
-        if grey.full == grey.empty || grey.least.is_nan() || grey.least <= 0.0 {
+        let line = [grey.empty, grey.full, grey.least];
+        if grey.full == grey.empty || grey.least <= 0.0 || line.iter().any(|v| !v.is_finite()) {
             return Err(Error::setting(
                 "density.grey",
-                "empty and full are equal, or least is not positive",
-                "correct them",
+                format!(
+                    "found empty = {}, full = {}, least = {}",
+                    line[0], line[1], line[2]
+                ),
+                "give two different grey values, and a least density above 0",
+            ));
+        }
+        let unknown = |p: &usize| {
+            let [i, j] = points.cell(*p);
+            !values[j as usize * bitmap.n[0] + i as usize].is_finite()
+        };
+        let unknown = (0..points.len()).filter(unknown).count();
+        if unknown > 0 {
+            return Err(Error::setting(
+                "density.grey",
+                format!("{unknown} cells of the geometry have no grey value (NaN or infinite)"),
+                "take a slice without gaps, or leave them out of the mask",
             ));
         }
         let at = |p: usize| {
@@ -199,6 +215,22 @@ pub struct Probe {
     pub region: Region,
 }
 
+/// A probe's name becomes part of column names.
+fn check_name(probes: &[Probe], k: usize) -> Result<()> {
+    let name = &probes[k].name;
+    let plain = |c: char| c.is_alphanumeric() || "_- ".contains(c);
+    let found = match probes[..k].iter().any(|p| p.name == *name) {
+        true => format!("\"{name}\" is the name of an earlier probe, too"),
+        false if name.is_empty() || !name.chars().all(plain) => format!("found \"{name}\""),
+        false => return Ok(()),
+    };
+    Err(Error::setting(
+        format!("probe[{k}].name"),
+        found,
+        "give each probe a name of its own, of letters, digits, spaces, - and _",
+    ))
+}
+
 /// The whole body and the probes' points.
 pub struct Probes {
     regions: Vec<(String, Vec<usize>)>,
@@ -215,6 +247,7 @@ impl Probes {
     pub fn weighted(probes: &[Probe], points: &Points, area: Vec<f64>) -> Result<Self> {
         let mut regions = vec![(String::new(), (0..points.len()).collect())];
         for (k, probe) in probes.iter().enumerate() {
+            check_name(probes, k)?;
             let key = format!("probe[{k}].region");
             let chosen = probe.region.select(points, points.len(), &key)?;
             regions.push((format!("{}.", probe.name), chosen));

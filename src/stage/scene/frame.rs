@@ -1,6 +1,6 @@
 //! Owns what a running scene tells the outside: states as they are accepted, and a closing summary.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::stage::scene::pace::Pace;
 use crate::stage::scene::state::State;
 use crate::topology::plane::Points;
@@ -27,6 +27,34 @@ pub struct Output {
 }
 
 impl Output {
+    /// # Errors
+    /// Times or a range that cannot be.
+    pub fn check(&self) -> Result<()> {
+        let wrong =
+            |key: &str, found: String, advice: &str| Err(Error::setting(key, found, advice));
+        if let Some(t) = self.times.iter().find(|t| !(t.is_finite() && **t >= 0.0)) {
+            return wrong("output.times", format!("found {t}"), "give times from 0 on");
+        }
+        if let Some(every) = self.every.filter(|e| !(e.is_finite() && *e > 0.0)) {
+            return wrong(
+                "output.every",
+                format!("found {every}"),
+                "give a positive time",
+            );
+        }
+        match self.range {
+            Some([low, high]) if !(low.is_finite() && high.is_finite() && low < high) => {
+                let found = format!("found [{low}, {high}]");
+                wrong(
+                    "output.range",
+                    found,
+                    "give the lowest value, then the highest",
+                )
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Whether fields are due after a step from `before` to `now`.
     pub fn due(&self, before: f64, now: f64) -> bool {
         let slack = 1e-9 * now.abs().max(1e-300);

@@ -69,9 +69,10 @@ impl Clock {
         })
     }
 
+    /// Without what rounding adds: three steps of 0.1 end at 0.3.
     fn at(&self, ticks: u64) -> f64 {
         let (planned, rest) = (ticks / self.whole, ticks % self.whole);
-        planned as f64 * self.step + self.step * rest as f64 / self.whole as f64
+        rounded(planned as f64 * self.step + self.step * rest as f64 / self.whole as f64)
     }
 
     /// Length of so many ticks: the same wherever they begin.
@@ -82,6 +83,11 @@ impl Clock {
     fn length(&self, level: u32) -> f64 {
         self.step / (1u64 << level) as f64
     }
+}
+
+/// To twelve digits: more than any step needs, less than rounding spoils.
+pub fn rounded(t: f64) -> f64 {
+    format!("{t:.11e}").parse().unwrap_or(t)
 }
 
 /// How far a march has come, and what it took.
@@ -150,6 +156,12 @@ impl Progress {
             total("largest_residual", self.worst),
         ]);
     }
+}
+
+/// # Errors
+/// Times that no march can take.
+pub fn check(time: &Time) -> Result<()> {
+    Clock::new(time).map(|_| ())
 }
 
 /// Marches to `time.end`, from rest or from the state the observer kept. A step that fails at its smallest stops the

@@ -71,6 +71,13 @@ impl Pace {
 
 impl fmt::Display for Pace {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.longest_step == 0.0 {
+            return write!(
+                f,
+                "time step halved {} times, none was taken",
+                self.halvings
+            );
+        }
         write!(
             f,
             "time step halved {} times, grown {} times; steps taken from {:.3e} to {:.3e}",
@@ -89,6 +96,12 @@ mod tests {
         assert!(!pace.changed());
         [0.2, 0.2 + 1e-15].iter().for_each(|dt| pace.accepted(*dt));
         assert!(!pace.changed() && pace.growths == 0);
+        let mut stuck = Pace::default();
+        stuck.halved();
+        assert_eq!(
+            stuck.to_string(),
+            "time step halved 1 times, none was taken"
+        );
         pace.halved();
         let mut state = State::default();
         pace.save(&mut state);

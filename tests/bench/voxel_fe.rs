@@ -1,7 +1,11 @@
 //! Speed of voxel finite elements: operator in both precisions, multigrid's set-up and cycle, whole solves, each
-//! beside a triad of the same run. `cargo bench --bench voxel_fe`; `BONEPD_BENCH_VOXELS` sets the edge (default 100).
+//! beside a triad of the same run; and the operators' share of what memory and arithmetic allow, measured with them.
+//! `cargo bench --bench voxel_fe`; `BONEPD_BENCH_VOXELS` sets the edge (default 100).
 
-use bonepd_ct::grid::{Axis, Grid};
+mod limits;
+mod specimen;
+
+use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::coarsen::Coarsen;
 use bonepd_ct::operator::held::Held;
 use bonepd_ct::operator::{Operator, SinglePreconditioner};
@@ -12,31 +16,11 @@ use bonepd_ct::solve::amg::{Amg, AmgParams};
 use bonepd_ct::stage::solve::SolveParams;
 use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
 use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
-use bonepd_ct::volume::{Specimen, Volume};
+use bonepd_ct::volume::Specimen;
 use criterion::{Criterion, Throughput};
+use limits::{Limits, median_s};
 use rayon::prelude::*;
 use std::hint::black_box;
-
-/// Bone where a sum of waves is large: `solid` of 1 is full. Plump at 0.25 with 8-voxel waves, thin at 0.12.
-fn phantom(n: usize, wave: f64, solid: f64) -> Specimen {
-    let grid = Grid::new([n; 3], [0.02; 3]);
-    let k = std::f64::consts::TAU / wave;
-    let level = |i: usize| {
-        let [x, y, z] = [i % n, i / n % n, i / (n * n)].map(|v| k * v as f64);
-        (x.sin() * y.cos() + y.sin() * z.cos() + z.sin() * x.cos()).abs()
-    };
-    let mut sorted: Vec<f64> = (0..grid.len()).step_by(7).map(level).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let cut = sorted[((sorted.len() - 1) as f64 * solid) as usize];
-    let voxels = (0..grid.len()).map(|i| u8::from(level(i) <= cut)).collect();
-    Specimen {
-        name: "phantom".into(),
-        tv_mm3: grid.size_mm().iter().product(),
-        bone: Volume::from_vec(grid, voxels),
-        tv_definition: "box".into(),
-        grey: None,
-    }
-}
 
 fn model(specimen: &Specimen) -> (Hex8, Held) {
     let grid = specimen.bone.grid;
@@ -54,10 +38,10 @@ fn model(specimen: &Specimen) -> (Hex8, Held) {
 }
 
 fn benches(c: &mut Criterion) {
-    let n = std::env::var("BONEPD_BENCH_VOXELS").map_or(100, |v| v.parse().unwrap_or(100));
+    let n = specimen::edge(100);
     for (name, wave, solid) in [("plump", 40.0, 0.25), ("thin", 20.0, 0.12)] {
-        let specimen = phantom(n, wave, solid);
-        let (op, held) = model(&specimen);
+        let bone = specimen::waves(n, wave, solid);
+        let (op, held) = model(&bone);
         let nodes = op.sites();
         let x = vec![[0.5; 3]; nodes];
         let mut y = vec![[0.0; 3]; nodes];
@@ -71,14 +55,9 @@ fn benches(c: &mut Criterion) {
             b.iter(|| op.apply(black_box(&x), &mut y))
         });
         group.bench_function("operator f32", |b| {
-            b.iter(|| {
-                let x = black_box(&x32);
-                y32.par_chunks_mut(CHUNK)
-                    .enumerate()
-                    .for_each(|(c, y)| op.rows_f32(c * CHUNK..c * CHUNK + y.len(), x, y));
-            })
+            b.iter(|| rows_f32(&op, black_box(&x32), &mut y32))
         });
-        let params = AmgParams::new(specimen.bone.grid.spacing_mm);
+        let params = AmgParams::new(bone.bone.grid.spacing_mm);
         group.bench_function("set-up", |b| b.iter(|| Amg::new(&op, &held, &params)));
         let amg = Amg::new(&op, &held, &params);
         let mut spare = x32.clone();
@@ -87,12 +66,43 @@ fn benches(c: &mut Criterion) {
         });
         drop(amg);
         group.bench_function("solve to 0.1 %", |b| {
-            b.iter(|| {
-                solve_voxels(&specimen, &SolveParams::default(), |_| ()).map(|s| s.iterations)
-            })
+            b.iter(|| solve_voxels(&bone, &SolveParams::default(), |_| ()).map(|s| s.iterations))
         });
         group.finish();
+        roofline(name, &bone);
     }
+}
+
+/// Floating-point operations a node, as `physics::hex8::kernel` counts them.
+const FLOPS: f64 = 567.0;
+
+fn roofline(name: &str, bone: &Specimen) {
+    let limits = Limits::measure();
+    println!(
+        "\n{name}: triad {:.1} GB/s, fused multiply-add {:.0} GFLOP/s (f64, 256 bits wide)",
+        limits.triad, limits.fma_f64
+    );
+    let (op, _) = model(bone);
+    let nodes = op.mesh.around.iter().filter(|a| **a != 0).count() as f64;
+    let (x, mut y) = (vec![[0.5; 3]; op.sites()], vec![[0.0; 3]; op.sites()]);
+    let (x32, mut y32) = (vec![[0.5f32; 3]; op.sites()], vec![[0f32; 3]; op.sites()]);
+    let double = median_s(|| op.apply(black_box(&x), &mut y));
+    let single = median_s(|| rows_f32(&op, black_box(&x32), &mut y32));
+    // Displacements in, forces out, a byte for the elements around.
+    for (precision, time, bytes) in [("f64", double, 49.0), ("f32", single, 25.0)] {
+        let (least, bound) = limits.least_s(bytes, FLOPS, precision == "f32");
+        println!(
+            "  operator {precision}: {:.1} M nodes/s; {bytes} bytes and {FLOPS} flops a node; {:.0} % of the {bound} limit",
+            1e-6 * nodes / time,
+            100.0 * least * nodes / time
+        );
+    }
+}
+
+fn rows_f32(op: &Hex8, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
+    y.par_chunks_mut(CHUNK)
+        .enumerate()
+        .for_each(|(c, y)| op.rows_f32(c * CHUNK..c * CHUNK + y.len(), x, y));
 }
 
 fn triad(x: &[[f64; 3]], y: &mut [[f64; 3]]) {

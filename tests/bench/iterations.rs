@@ -1,0 +1,130 @@
+//! Iterations to 0.1 % of E_app by voxel FE: those after which the true error is that small, those after which the program
+//! stops, and those of plain conjugate gradients. `cargo bench --bench iterations`, half an hour; words choose
+//! cases (`-- thin-3 stack`). Iterations do not depend on the machine.
+
+use bonepd_ct::operator::held::Constrained;
+use bonepd_ct::run::segment::in_memory;
+use bonepd_ct::run::session::Session;
+use bonepd_ct::solve::cg::{self, CgParams, ENERGY_ALONE};
+use bonepd_ct::solve::jacobi::Jacobi;
+use bonepd_ct::stage::phantom::{PhantomParams, scan, structure};
+use bonepd_ct::stage::segment::{SegmentParams, segment};
+use bonepd_ct::stage::solve::bricks::{Bricks, Keep};
+use bonepd_ct::stage::solve::voxel_fe::{solve_voxels, supports};
+use bonepd_ct::stage::solve::{Ends, SolveParams};
+use bonepd_ct::topology::voxels::Planes;
+use bonepd_ct::volume::{Specimen, Volume};
+use std::path::Path;
+
+const TARGET: f64 = 1e-3;
+
+fn main() {
+    let words: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|w| !w.starts_with('-'))
+        .collect();
+    let wanted = |name: &str| words.is_empty() || words.iter().any(|w| w == name);
+    for seed in 1..=5 {
+        let name = format!("thin-{seed}");
+        if wanted(&name) {
+            report(&name, &thin(seed), Ends::Bonded);
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let stack = root.join("../shared/data/lhdl_3155_D_4_bc");
+    if wanted("stack") {
+        match stack.exists() {
+            true => report("stack", &real(&stack), Ends::Free),
+            false => println!("stack: skipped: {} is not there", stack.display()),
+        }
+    }
+}
+
+/// Struts of two voxels at BV/TV 12 %, about a million unknowns.
+fn thin(seed: u64) -> Specimen {
+    let params = PhantomParams {
+        size_mm: [2.3; 3],
+        spacing_mm: 0.02,
+        bvtv: 0.12,
+        thickness_mm: 0.04,
+        seed,
+        ..PhantomParams::default()
+    };
+    let grey = scan(&mut structure(&params).expect("a phantom"), &params);
+    let values = grey.as_slice().iter().map(|&v| f32::from(v)).collect();
+    let grey = Volume::from_vec(grey.grid, values);
+    let window = SegmentParams {
+        lower: Some(200.0),
+        ..SegmentParams::default()
+    };
+    segment("thin", &grey, &window, None)
+        .expect("bone")
+        .specimen
+}
+
+fn real(stack: &Path) -> Specimen {
+    let window = SegmentParams {
+        spacing_mm: Some([0.0195; 3]),
+        gaussian_voxels: 1.0,
+        lower: Some(63.0),
+        ..SegmentParams::default()
+    };
+    in_memory(stack, None, &window, &Session::default()).expect("a stack of slices")
+}
+
+fn report(name: &str, specimen: &Specimen, ends: Ends) {
+    let params = SolveParams {
+        ends,
+        ..SolveParams::default()
+    };
+    let solve = |params: &SolveParams| {
+        let solved = solve_voxels(specimen, params, |_| ()).expect("a solve");
+        (solved.iterations, solved.moduli.e_app_mpa, solved.unknowns)
+    };
+    let (_, exact, unknowns) = solve(&SolveParams {
+        tolerance: 1e-8,
+        ..params.clone()
+    });
+    let (stopped, e_app, _) = solve(&params);
+    let error_after = |max_iterations: usize| {
+        let (_, e_app, _) = solve(&SolveParams {
+            max_iterations,
+            ..params.clone()
+        });
+        e_app / exact - 1.0
+    };
+    let mut enough = stopped;
+    while enough > 1 && error_after(enough - 1) < TARGET {
+        enough -= 1;
+    }
+    println!(
+        "{name}: {unknowns} unknowns, E_app {exact:.4} MPa; below 0.1 % after {enough} iterations, stopped after {stopped} with {:+.4} %",
+        100.0 * (e_app / exact - 1.0),
+    );
+    let (iterations, energy) = plain(specimen, &params);
+    let energy_exact = exact * specimen.tv_mm3 * params.strain * params.strain;
+    println!(
+        "{name}: plain conjugate gradients to a residual of 1e-6: {iterations} iterations, {:+.4} %",
+        100.0 * (energy / energy_exact - 1.0)
+    );
+}
+
+/// Iterations of conjugate gradients with the diagonal until the residual is 1e-6 of the first, and the energy `uᵀAu`.
+fn plain(specimen: &Specimen, params: &SolveParams) -> (usize, f64) {
+    let model = Bricks::new(specimen, params, Keep::BetweenGrips).expect("bricks");
+    let grid = model.mesh().grid;
+    let grips = Planes::within(&grid, params.axis, 0.0).expect("room between the ends");
+    let stretch_mm = params.strain * grid.size_mm()[params.axis.index()];
+    let (held, mut u) = supports(model.mesh(), grips, params, stretch_mm);
+    let diagonal = Jacobi::new(&Constrained {
+        inner: &model,
+        held: &held,
+    });
+    let cg = CgParams {
+        energy_tolerance: 0.0,
+        residual_tolerance: 1e-6,
+        ..CgParams::default()
+    };
+    let info = cg::minimise(&model, &held, &diagonal, &mut u, &cg, ENERGY_ALONE, |_| ());
+    (info.iterations, info.energy)
+}

@@ -1,9 +1,10 @@
 //! Owns what a running scene leaves on disk: history, fields, maps, the animation, and the state to go on from.
 
+mod kept;
+
 use super::differences::{self, Other};
 use crate::error::{Error, Result};
 use crate::io::map::{self, Range};
-use crate::io::state::{self, Kept};
 use crate::io::{atomic, history, plot, points as files};
 use crate::run::session::Session;
 use crate::stage::report::figure::{Axis, Content, Curve, Figure, Mark, Point};
@@ -17,8 +18,7 @@ use std::time::{Duration, Instant};
 /// Scalar fields by name.
 pub type Scalars = Vec<(String, Vec<f64>)>;
 
-/// The state that a stopped scene goes on from, and how much time may pass without keeping it anew.
-const STATE: &str = "state.bin";
+/// How much time may pass without keeping the state anew.
 const EVERY: Duration = Duration::from_secs(10);
 
 /// Writes what a scene reports.
@@ -209,59 +209,6 @@ impl<'a> Writer<'a> {
     }
 }
 
-impl Writer<'_> {
-    fn state_path(&self) -> PathBuf {
-        self.out.join(STATE)
-    }
-
-    /// Whether this very scene was stopped here before.
-    pub fn goes_on(&self) -> bool {
-        let kept = || state::read(&self.state_path(), &self.fingerprint);
-        !self.session.force && matches!(kept(), Kept::State(_))
-    }
-
-    /// A finished scene has nothing to go on from.
-    pub fn forget(&self) -> Result<()> {
-        let path = self.state_path();
-        match std::fs::remove_file(&path) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::file(
-                path,
-                format!("cannot be removed: {e}"),
-                "remove it by hand: it belongs to a finished scene",
-            )),
-            _ => Ok(()),
-        }
-    }
-
-    /// What had been reported up to a kept state: rows of the history, and maps, from their files.
-    fn recall(&mut self, state: &State) -> Result<()> {
-        let rows = state.number(ROWS)? as usize;
-        self.history = history::read(&self.out.join("history.csv"), rows)?;
-        let times = state.find(TIMES).unwrap_or_default();
-        let names = state.arrays().filter_map(|(n, _)| n.strip_prefix(MAP));
-        // Numbered, so that they come back in their order.
-        let names: Vec<&str> = names.filter_map(|n| Some(n.split_once('.')?.1)).collect();
-        for &t in times {
-            let file = self.out.join(format!("fields_t{t}.csv"));
-            let scalar = |name: &&str| {
-                let values = files::read_column(&file, name)?;
-                Ok((
-                    (*name).to_owned(),
-                    values.into_iter().map(|v| v.1).collect(),
-                ))
-            };
-            let scalars = names.iter().map(scalar).collect::<Result<_>>()?;
-            self.maps.push((t, scalars));
-        }
-        self.bar.set_position(rows as u64);
-        Ok(())
-    }
-}
-
-const ROWS: &str = "writer.rows";
-const TIMES: &str = "writer.times";
-const MAP: &str = "writer.map.";
-
 impl Observer for Writer<'_> {
     fn start(&mut self, points: &Points, steps: usize) -> Result<()> {
         if let Some(folder) = &self.minus {
@@ -297,44 +244,12 @@ impl Observer for Writer<'_> {
     fn say(&mut self, line: &str) {
         self.bar.suspend(|| self.session.detail(line));
     }
+
     fn resume(&mut self) -> Result<Option<State>> {
-        if self.session.force {
-            return Ok(None);
-        }
-        let state = match state::read(&self.state_path(), &self.fingerprint) {
-            Kept::Nothing => return Ok(None),
-            Kept::Unusable(why) => {
-                self.session
-                    .say(format!("{STATE} is not used: {why}; starting anew"));
-                return Ok(None);
-            }
-            Kept::State(state) => state,
-        };
-        if let Err(e) = self.recall(&state) {
-            self.session
-                .say(format!("{STATE} is not used: {e}\nstarting anew"));
-            self.history.clear();
-            self.maps.clear();
-            return Ok(None);
-        }
-        Ok(Some(state))
+        self.last_state()
     }
 
     fn keep(&mut self, state: &dyn Fn() -> State) -> Result<()> {
-        if self.kept.elapsed() < self.every {
-            return Ok(());
-        }
-        self.write_history()?;
-        let mut state = state();
-        state.put(ROWS, [self.history.len() as f64]);
-        let times: Vec<f64> = self.maps.iter().map(|(t, _)| *t).collect();
-        state.put(TIMES, times);
-        let names = self.maps.first().map(|(_, s)| s.as_slice());
-        for (k, (name, _)) in names.unwrap_or_default().iter().enumerate() {
-            state.put(&format!("{MAP}{k:04}.{name}"), []);
-        }
-        state::write(&self.state_path(), &self.fingerprint, &state)?;
-        self.kept = Instant::now();
-        Ok(())
+        self.keep_state(state)
     }
 }

@@ -10,19 +10,14 @@
 //! the harmonic mean over slices (slices are in series), and of both ends the geometric mean. Where bone ends at a voxel,
 //! half of that voxel bears. Where all is bone, every share is 1 and the lattice is the uniform one.
 
+mod bonding;
 mod cell;
+mod touching;
 
 use crate::topology::placement::Frame;
 use crate::topology::sites::Grips;
 use crate::volume::Volume;
-use cell::{Cell, NO_PIECE};
-use rayon::prelude::*;
-
-/// Cells' pieces with less bone than this share of a cell are no sites.
-const LEAST_FRACTION: f32 = 0.02;
-
-/// Bonds with less than this share are left out.
-const LEAST_SHARE: f32 = 1e-4;
+use bonding::Bonding;
 
 /// Bonds by site: those of site `s` are `start[s]..start[s + 1]`. Each stands at both of its ends.
 #[derive(Debug, Clone, Default)]
@@ -50,6 +45,51 @@ impl Bonds {
     }
 }
 
+impl Bonds {
+    /// Sites with a path of bonds to a seed.
+    fn reached(&self, seed: impl Fn(usize) -> bool) -> Vec<bool> {
+        let sites = self.start.len() - 1;
+        let mut queue: Vec<usize> = (0..sites).filter(|&s| seed(s)).collect();
+        let mut seen = vec![false; sites];
+        for &s in &queue {
+            seen[s] = true;
+        }
+        while let Some(s) = queue.pop() {
+            for (end, ..) in self.of(s) {
+                if !std::mem::replace(&mut seen[end], true) {
+                    queue.push(end);
+                }
+            }
+        }
+        seen
+    }
+
+    /// Keeps the given sites, in ascending order, in place. A bond keeps both ends or neither: what it reaches, it
+    /// reaches both ways.
+    fn keep(&mut self, sites: &[usize]) {
+        let mut numbers = vec![u32::MAX; self.start.len() - 1];
+        for (n, &s) in sites.iter().enumerate() {
+            numbers[s] = n as u32;
+        }
+        let mut at = 0;
+        for (n, &s) in sites.iter().enumerate() {
+            let own = self.start[s] as usize..self.start[s + 1] as usize;
+            self.start[n] = at as u32;
+            for b in own {
+                self.neighbour[at] = numbers[self.neighbour[b] as usize];
+                self.direction[at] = self.direction[b];
+                self.share[at] = self.share[b];
+                at += 1;
+            }
+        }
+        self.start[sites.len()] = at as u32;
+        self.start.truncate(sites.len() + 1);
+        self.neighbour.truncate(at);
+        self.direction.truncate(at);
+        self.share.truncate(at);
+    }
+}
+
 /// The pieces that carry load, in the order of their cells.
 #[derive(Debug, Clone)]
 pub struct Pieces {
@@ -66,7 +106,8 @@ pub struct Pieces {
 
 /// A piece while the lattice is put together.
 struct Piece {
-    cell: usize,
+    /// Candidate of the frame.
+    cell: u32,
     fraction: f32,
     /// Cross-section of the half cell below and above along each axis, as a share of a whole one.
     ends: [[f32; 2]; 3],
@@ -75,49 +116,26 @@ struct Piece {
 impl Pieces {
     /// Builds the lattice of simple cubic `frame`, keeping what has a path of bonds to both grips.
     pub fn connect(frame: Frame, bone: &Volume<u8>, grips: Grips) -> Self {
-        let cells: Vec<Option<Box<Cell>>> = (0..frame.candidates())
-            .into_par_iter()
-            .map(|c| {
-                Cell::of(
-                    bone,
-                    frame.position_mm(frame.indices(c)),
-                    frame.lp_mm,
-                    frame.axis,
-                )
-                .map(Box::new)
-            })
-            .collect();
-        let (pieces, first) = number(&cells);
-        let touching = touching(&frame, &cells, &first, pieces.len());
-        drop(cells);
-        let rows = rows(&frame, &pieces, &touching);
+        let (pieces, touching) = touching::find(&frame, bone);
+        let mut bonds = Bonding {
+            frame: &frame,
+            pieces: &pieces,
+            touching: &touching,
+        }
+        .all();
         drop(touching);
         let axis = frame.axis.index();
-        let plane = |p: usize| frame.indices(pieces[p].cell)[axis];
-        let low = reached(&rows, |p| plane(p) <= grips.low);
-        let high = reached(&rows, |p| plane(p) >= grips.high);
-        let mut numbers = vec![u32::MAX; pieces.len()];
+        let plane = |p: usize| frame.indices(pieces[p].cell as usize)[axis];
+        let low = bonds.reached(|p| plane(p) <= grips.low);
+        let high = bonds.reached(|p| plane(p) >= grips.high);
         let kept: Vec<usize> = (0..pieces.len()).filter(|&p| low[p] && high[p]).collect();
-        for (n, &p) in kept.iter().enumerate() {
-            numbers[p] = n as u32;
-        }
-        let mut bonds = Bonds {
-            start: vec![0],
-            ..Bonds::default()
-        };
-        for &p in &kept {
-            // A bond keeps both ends or neither: what it reaches, it reaches both ways.
-            for &(end, direction, share) in &rows[p] {
-                bonds.neighbour.push(numbers[end as usize]);
-                bonds.direction.push(direction);
-                bonds.share.push(share);
-            }
-            bonds.start.push(bonds.neighbour.len() as u32);
+        if kept.len() < pieces.len() {
+            bonds.keep(&kept);
         }
         Pieces {
             indices: kept
                 .iter()
-                .map(|&p| frame.indices(pieces[p].cell))
+                .map(|&p| frame.indices(pieces[p].cell as usize))
                 .collect(),
             fractions: kept.iter().map(|&p| pieces[p].fraction).collect(),
             bonds,
@@ -145,133 +163,6 @@ impl Pieces {
             ends.filter(|(a, b)| a < b)
         })
     }
-}
-
-/// All pieces that are large enough, and for each cell the number of its first label, then of every label's piece.
-fn number(cells: &[Option<Box<Cell>>]) -> (Vec<Piece>, Vec<Vec<u32>>) {
-    let mut pieces = Vec::new();
-    let numbers = cells
-        .iter()
-        .enumerate()
-        .map(|(c, cell)| {
-            let found = cell.iter().flat_map(|cell| &cell.pieces);
-            found
-                .map(|piece| {
-                    if piece.fraction <= LEAST_FRACTION {
-                        return u32::MAX;
-                    }
-                    pieces.push(Piece {
-                        cell: c,
-                        fraction: piece.fraction,
-                        ends: piece.ends,
-                    });
-                    pieces.len() as u32 - 1
-                })
-                .collect()
-        })
-        .collect();
-    (pieces, numbers)
-}
-
-/// Pieces that each piece touches, with the bond of the stencil that leads there: across the faces of its cell.
-fn touching(
-    frame: &Frame,
-    cells: &[Option<Box<Cell>>],
-    numbers: &[Vec<u32>],
-    pieces: usize,
-) -> Vec<Vec<(u32, u8)>> {
-    let mut touching = vec![Vec::new(); pieces];
-    for (c, cell) in cells.iter().enumerate() {
-        let Some(cell) = cell else { continue };
-        for a in 0..3 {
-            let mut at = frame.indices(c);
-            at[a] += 1;
-            let Some(n) = frame.candidate(at) else {
-                continue;
-            };
-            let Some(next) = &cells[n] else { continue };
-            for (&here, &there) in cell.last[a].iter().zip(&next.first[a]) {
-                if here == NO_PIECE || there == NO_PIECE {
-                    continue;
-                }
-                let (p, q) = (numbers[c][here as usize], numbers[n][there as usize]);
-                if p == u32::MAX || q == u32::MAX {
-                    continue;
-                }
-                if !touching[p as usize].contains(&(q, 2 * a as u8)) {
-                    touching[p as usize].push((q, 2 * a as u8));
-                    touching[q as usize].push((p, 2 * a as u8 + 1));
-                }
-            }
-        }
-    }
-    touching
-}
-
-/// Every piece's bonds: end, direction, share.
-fn rows(frame: &Frame, pieces: &[Piece], touching: &[Vec<(u32, u8)>]) -> Vec<Vec<(u32, u8, f32)>> {
-    let stencil = frame.structure.stencil();
-    let directions: Vec<[i32; 3]> = (0..stencil.coordination())
-        .map(|b| stencil.direction(b))
-        .collect();
-    let along = |p: usize, d: [i32; 3], sign: i32| {
-        let axes = (0..3).filter(|&a| d[a] != 0);
-        let (sum, n) = axes.fold((0.0, 0.0), |(sum, n), a| {
-            let side = usize::from(sign * d[a] > 0);
-            (sum + pieces[p].ends[a][side], n + 1.0)
-        });
-        sum / n
-    };
-    let (axis, last) = (frame.axis.index(), frame.planes() as i32 - 1);
-    let bond = |p: usize, q: u32, b: usize| {
-        let d = directions[b];
-        let share = (along(p, d, 1) * along(q as usize, d, -1)).sqrt();
-        // Of the cells around the end planes only the half between the planes is under load.
-        let plane = frame.indices(pieces[p].cell)[axis];
-        let half = d[axis] == 0 && (plane == 0 || plane == last);
-        (q, b as u8, if half { 0.5 * share } else { share })
-    };
-    let between = |d: [i32; 3]| directions.iter().position(|e| *e == d);
-    (0..pieces.len())
-        .into_par_iter()
-        .map(|p| {
-            let mut row: Vec<(u32, u8, f32)> = Vec::new();
-            for &(q, b) in &touching[p] {
-                row.push(bond(p, q, usize::from(b)));
-                for &(r, e) in &touching[q as usize] {
-                    let (d, e) = (directions[usize::from(b)], directions[usize::from(e)]);
-                    let sum: [i32; 3] = std::array::from_fn(|a| d[a] + e[a]);
-                    let Some(diagonal) = between(sum) else {
-                        continue;
-                    };
-                    if !row.iter().any(|x| (x.0, usize::from(x.1)) == (r, diagonal)) {
-                        row.push(bond(p, r, diagonal));
-                    }
-                }
-            }
-            row.retain(|x| x.2 > LEAST_SHARE);
-            row.sort_unstable_by_key(|x| (x.1, x.0));
-            row.shrink_to_fit();
-            row
-        })
-        .collect()
-}
-
-/// Pieces with a path of bonds to a seed.
-fn reached(rows: &[Vec<(u32, u8, f32)>], seed: impl Fn(usize) -> bool) -> Vec<bool> {
-    let mut queue: Vec<usize> = (0..rows.len()).filter(|&p| seed(p)).collect();
-    let mut seen = vec![false; rows.len()];
-    for &p in &queue {
-        seen[p] = true;
-    }
-    while let Some(p) = queue.pop() {
-        for &(q, ..) in &rows[p] {
-            if !std::mem::replace(&mut seen[q as usize], true) {
-                queue.push(q as usize);
-            }
-        }
-    }
-    seen
 }
 
 #[cfg(test)]

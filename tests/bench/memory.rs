@@ -73,10 +73,11 @@ fn main() {
             (Structure::Sc, Boundary::Floppy),
             (Structure::Sc, Boundary::Firm),
             (Structure::Bcc, Boundary::Floppy),
+            (Structure::Sc, Boundary::Graded),
         ] {
             let lp_mm = match (structure, boundary) {
                 (Structure::Bcc, _) => 0.02 * 2f64.cbrt(),
-                (_, Boundary::Firm) => 0.03,
+                (_, Boundary::Firm | Boundary::Graded) => 0.03,
                 _ => 0.02,
             };
             let case = Case {

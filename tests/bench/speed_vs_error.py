@@ -378,4 +378,5 @@ def main():
     draw()
 
 
-main()
+if __name__ == "__main__":
+    main()

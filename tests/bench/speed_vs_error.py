@@ -2,7 +2,7 @@
 """Speed against error: phantoms and a real stack by every method, against voxel FE refined and extrapolated.
 
     python3 tests/bench/speed_vs_error.py target/release/bonepd-ct        # figures, tables, reports/speed-vs-error.csv
-    ... --references          # make reports/references.csv anew first (half an hour, 4 GiB)
+    ... --references          # make reports/references.csv anew first (an hour, 7 GiB)
     ... --draw                # only figures and tables, from the CSV files that are there
 
 Needs matplotlib (PyPI). The stack is read from ../shared/data where that is there, and skipped otherwise.
@@ -88,9 +88,7 @@ def references(bench):
     rows = []
     for name in specimens():
         e = []
-        # Three elements a voxel where they fit in 4 GiB.
-        most = 2 if name == "stack" or "bvtv0.4" in name else 3
-        for refine in range(1, most + 1):
+        for refine in (1, 2, 3):
             row = bench.solve(name, "--method", "voxel-fe", "--refine", refine, "--tolerance", "0.01%")[0]
             e.append(number(row, "e_app_mpa"))
         rows.append([name, number(row, "bv_tv"), e])

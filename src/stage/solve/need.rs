@@ -21,7 +21,7 @@ const DIFFERING: f64 = 28.0;
 
 /// Bytes a lattice site, and a site of graded lattices, whose bonds have shares.
 const SITE: f64 = 195.0;
-const PIECE: f64 = 800.0;
+const PIECE: f64 = 360.0;
 
 /// Edge of multigrid's boxes in nodes.
 const BOX: usize = 5;

@@ -8,6 +8,8 @@ For models too large for one machine: ParOSol runs on thousands of cores (https:
     mpirun -np 512 parosol --tol 1e-6 model.h5                    # adds /Solution to the file
     python3 pipelines/parosol.py read out model.h5                # one line of CSV: E_app from the energy and the reaction
 
+Of a scan segmented by labels, `--labels 100=6829,127=10000` gives each its modulus; ParOSol has one Poisson's ratio.
+
 One cubic element per bone voxel, in ParOSol's layout: arrays z, y, x; moduli in GPa (forces come out in N with lengths in mm);
 coordinates of nodes as z, y, x and the direction (0 x, 1 y, 2 z). The faces across the load axis are bonded, or with
 `--ends free` may slide: nothing holds the body sideways then, and conjugate gradients leave its rigid motions alone.
@@ -37,6 +39,38 @@ def specimen(folder):
     return mask, float(numpy.mean(spacing)), record["tv_mm3"]
 
 
+def moduli(arguments, mask):
+    """Young's modulus in MPa by voxel, 0 in pores."""
+    grey = arguments.dir / "grey.nii.gz"
+    if arguments.labels is None:
+        if grey.exists() and not arguments.one_tissue:
+            sys.exit(f"{arguments.dir}: keeps the scan's values, so that tissue may differ from voxel to voxel: give --labels VALUE=E,… "
+                     "(of other laws ParOSol knows none; `bonepd-ct solve --export inp` writes them), or --one-tissue to take "
+                     f"{arguments.young_mpa} MPa everywhere")
+        return mask * arguments.young_mpa
+    if not grey.exists():
+        sys.exit(f"{arguments.dir}: holds no labels: run `bonepd-ct segment` with --labels, or leave --labels out here")
+    values = numpy.asarray(nibabel.load(grey).dataobj)
+    young = numpy.zeros(mask.shape)
+    for value, modulus in arguments.labels.items():
+        young[mask & (values == value)] = modulus
+    strange = numpy.unique(values[mask & (young == 0)])
+    if len(strange):
+        sys.exit(f"{arguments.dir}: no modulus for the labels {', '.join(f'{v:g}' for v in strange[:5])}: add them to --labels")
+    return young
+
+
+def labels(words):
+    """`VALUE=E,…`, moduli above 0 in MPa."""
+    try:
+        table = {float(value): float(modulus) for value, modulus in (word.split("=") for word in words.split(","))}
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected VALUE=E,… (one Poisson's ratio serves all), found {words}") from None
+    if not all(0 < modulus < float("inf") for modulus in table.values()):
+        raise argparse.ArgumentTypeError(f"expected moduli above 0 in MPa, found {words}")
+    return table
+
+
 def end_nodes(mask, axis, top):
     """Nodes of the bone on one face, as x, y, z."""
     face = numpy.take(mask, -1 if top else 0, axis=axis)
@@ -63,6 +97,7 @@ def held(mask, axis, ends, displacement):
 
 def export(arguments):
     mask, h, _ = specimen(arguments.dir)
+    young = moduli(arguments, mask)
     axis = AXES.index(arguments.axis)
     length = mask.shape[axis] * h
     coordinates, values = held(mask, axis, arguments.ends, arguments.strain * length)
@@ -70,14 +105,14 @@ def export(arguments):
         sys.exit(f"{arguments.dir}: no bone on the faces across {arguments.axis}: nothing would be loaded")
     with h5py.File(arguments.model, "w") as file:
         group = file.create_group("Image_Data")
-        group["Image"] = (mask * (arguments.young_mpa / 1000)).astype("float32").swapaxes(0, 2)
+        group["Image"] = (young / 1000).astype("float32").swapaxes(0, 2)
         group["Poisons_ratio"] = arguments.poisson
         group["Voxelsize"] = h
         group["Fixed_Displacement_Coordinates"] = coordinates[:, [2, 1, 0, 3]].astype("uint16")
         group["Fixed_Displacement_Values"] = values.astype("float32")
         group["Loaded_Nodes_Coordinates"] = numpy.zeros((0, 4), dtype="uint16")
         group["Loaded_Nodes_Values"] = numpy.zeros(0, dtype="float32")
-        model = {"young_mpa": arguments.young_mpa, "poisson": arguments.poisson, "strain": arguments.strain,
+        model = {"young_mpa": float(young[mask].mean()), "poisson": arguments.poisson, "strain": arguments.strain,
                  "ends": arguments.ends, "axis": arguments.axis}
         file.attrs["bonepd_ct"] = json.dumps(model)
     print(f"{arguments.model}: {int(mask.sum())} elements, {len(values)} prescribed displacements")
@@ -113,6 +148,9 @@ def main():
         sub.set_defaults(run=run)
         if run is export:
             sub.add_argument("--young-mpa", type=float, default=1000.0)
+            tissue = sub.add_mutually_exclusive_group()
+            tissue.add_argument("--labels", type=labels, metavar="VALUE=E,…", help="moduli in MPa of a scan segmented by labels")
+            tissue.add_argument("--one-tissue", action="store_true", help="one modulus, whatever values the scan has")
             sub.add_argument("--poisson", type=float, default=0.3)
             sub.add_argument("--strain", type=float, default=-0.01, help="negative is compression")
             sub.add_argument("--ends", choices=["bonded", "free"], default="bonded")

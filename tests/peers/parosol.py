@@ -18,7 +18,8 @@ PROGRAM = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "r
 TOOL = ROOT / "pipelines/parosol.py"
 
 try:
-    import nibabel  # noqa: F401
+    import nibabel
+    import numpy
     from parosol_py.runner import packaged_executable, run_parosol
 except ImportError as e:
     sys.exit(f"skipped: {e}; pip install parosol-py h5py nibabel")
@@ -33,23 +34,43 @@ def tool(*words):
     return done.stdout
 
 
-def compare(folder, ends, axis):
-    model = folder / f"{ends}-{axis}.h5"
+def compare(folder, ends, axis, scan="scan", here=(), there=()):
+    model = folder / f"{scan}-{ends}-{axis}.h5"
     flags = ["--method", "voxel-fe", "--ends", ends, "--axis", axis, "--strain=-0.004", "--tolerance", "1e-8", "--force"]
-    ours("solve", folder / "scan", *flags)
-    with open(folder / "scan/results.csv") as file:
+    ours("solve", folder / scan, *flags, *here)
+    with open(folder / scan / "results.csv") as file:
         row = list(csv.DictReader(file))[-1]
-    tool("export", folder / "scan", model, "--ends", ends, "--axis", axis, "--strain=-0.004")
+    tool("export", folder / scan, model, "--ends", ends, "--axis", axis, "--strain=-0.004", *there)
     ran = run_parosol([str(packaged_executable()), "--tol", "1e-8", model.name], cwd=folder)
     if ran.returncode:
         sys.exit(f"FAILED   ParOSol: {ran.stderr[-500:]}")
-    back = next(csv.DictReader(io.StringIO(tool("read", folder / "scan", model))))
+    back = next(csv.DictReader(io.StringIO(tool("read", folder / scan, model))))
     expected = float(row["e_app_mpa"])
     worst = max(abs(float(back[key]) / expected - 1) for key in ("e_app_mpa", "e_app_reaction_mpa"))
     # ParOSol keeps displacements of the supports in single precision: 6e-8 at best.
     fine = worst < 1e-5
-    print(f"{'ok      ' if fine else 'FAILED  '} {ends} along {axis}: here {expected:.6f} MPa, ParOSol "
+    print(f"{'ok      ' if fine else 'FAILED  '} {scan}, {ends} along {axis}: here {expected:.6f} MPa, ParOSol "
           f"{float(back['e_app_mpa']):.6f} from the energy, {float(back['e_app_reaction_mpa']):.6f} from the reaction")
+    return fine
+
+
+def labelled(folder):
+    """The same bone, every third voxel of another tissue."""
+    mask = nibabel.load(folder / "scan/mask.nii.gz")
+    bone = numpy.asarray(mask.dataobj)
+    x, y, z = numpy.indices(bone.shape)
+    labels = (bone * (1 + (x + 2 * y + z) % 3 // 2)).astype(numpy.int16)
+    nibabel.save(nibabel.Nifti1Image(labels, mask.affine), folder / "mixed.nii.gz")
+    ours("segment", folder / "mixed.nii.gz", "-o", folder / "mixed", "--labels", "1,2")
+
+
+def refused(folder):
+    """Mixed tissue is not taken for one without a word."""
+    words = [sys.executable, TOOL, "export", folder / "mixed", folder / "x.h5"]
+    plain = subprocess.run(words, capture_output=True, text=True)
+    half = subprocess.run([*words, "--labels", "1=800"], capture_output=True, text=True)
+    fine = plain.returncode == half.returncode == 1 and "--labels" in plain.stderr and "no modulus for the labels 2" in half.stderr
+    print(f"{'ok      ' if fine else 'FAILED  '} mixed tissue without its moduli is refused")
     return fine
 
 
@@ -60,6 +81,10 @@ def main():
         ours("phantom", "-o", folder / "scan.nii.gz", *size)
         ours("segment", folder / "scan.nii.gz", "-o", folder / "scan", "--lower", "200")
         fine = [compare(folder, ends, axis) for ends, axis in (("bonded", "z"), ("bonded", "x"), ("free", "z"))]
+        labelled(folder)
+        table = "1=800,2=2500"
+        fine.append(compare(folder, "bonded", "z", "mixed", ["--material", f"labels:{table}"], ["--labels", table]))
+        fine.append(refused(folder))
     sys.exit(0 if all(fine) else 1)
 
 

@@ -25,5 +25,6 @@ mod segment;
 mod stability;
 mod stiffness;
 mod stopped;
+mod stored;
 mod tissue;
 mod voxel_fe;

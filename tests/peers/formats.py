@@ -1,6 +1,6 @@
 """Files written by independent software, read by bonepd-ct: geometry, orientation, units, and a block of bone voxel by voxel of its mask.
 
-    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom tifffile Pillow aimio-py numpy
+    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom tifffile imagecodecs Pillow aimio-py numpy
     /tmp/peers/bin/python tests/peers/formats.py target/release/bonepd-ct
 
 A writer that is not installed is skipped with its reason. Exit code 1 if anything differs.
@@ -9,6 +9,7 @@ A writer that is not installed is skipped with its reason. Exit code 1 if anythi
 import importlib
 import json
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
@@ -31,8 +32,9 @@ def ask(*words):
     return json.loads(done.stdout)
 
 
-def check(name, path, world, spacing=SPACING, unit=None, extra=()):
-    """`world`: the expected mask of the block, canonical axes (z up, y front, x right), from our own mask file."""
+def check(name, path, world, spacing=SPACING, unit=None, extra=(), grey=None):
+    """`world`: the expected mask of the block, canonical axes (z up, y front, x right), from our own mask file; `grey`: all
+    values, whose least, greatest and mean must be told."""
     import nibabel
 
     try:
@@ -41,8 +43,13 @@ def check(name, path, world, spacing=SPACING, unit=None, extra=()):
             assert np.allclose(sorted(info["spacing_mm"]), sorted(spacing), rtol=1e-6), info["spacing_mm"]
         if unit:
             assert info["unit"] == unit, info["unit"]
+        if grey is not None:
+            grey = np.asarray(grey, dtype=float)
+            told = [info[f"grey_{what}"] for what in ("min", "max", "mean")]
+            assert np.allclose(told, [grey.min(), grey.max(), grey.mean()], rtol=1e-6), (told, grey.mean())
         with tempfile.TemporaryDirectory() as out:
-            ask("segment", path, "-o", out, "--lower", 2999.5, "--keep-all", *extra)
+            lower = () if "--lower" in extra else ("--lower", 2999.5)
+            ask("segment", path, "-o", out, *lower, "--keep-all", *extra)
             mask = nibabel.load(pathlib.Path(out) / "mask.nii.gz")
             found = np.asarray(mask.dataobj).T
         assert found.shape == world.shape, (found.shape, world.shape)
@@ -179,6 +186,26 @@ def tifffile_files(dir):
         path = dir / f"{name}.tif"
         tifffile.imwrite(path, GREY, photometric="minisblack", **more)
         check(f"tifffile {name}", path, world, None, extra=("--spacing", "0.02,0.02,0.05"))
+    for kind in (np.uint8, np.int8, np.uint16, np.int16, np.uint32, np.int32, np.uint64, np.int64, np.float16, np.float32, np.float64):
+        limits = np.iinfo(kind) if np.issubdtype(kind, np.integer) else None
+        # Small numbers take a coarser copy of the values, so that they fit; the mask is that of the copy.
+        small = GREY // 64 if np.dtype(kind).itemsize == 1 else GREY
+        stored = (small if limits is None else small.clip(limits.min, limits.max)).astype(kind)
+        path = dir / f"{np.dtype(kind).name}.tif"
+        tifffile.imwrite(path, stored, photometric="minisblack")
+        lower = 40.5 if np.dtype(kind).itemsize == 1 else 2999.5
+        check(f"tifffile {np.dtype(kind).name}", path, (stored.astype(float) > lower).astype(np.uint8), None,
+              extra=("--spacing", "0.02", "--lower", lower), grey=stored)
+    bone = GREY > 2999.5
+    for name, photometric, stored in (("black is 0", "minisblack", bone), ("white is 0", "miniswhite", ~bone)):
+        path = dir / f"{photometric}-1-bit.tif"
+        tifffile.imwrite(path, stored, photometric=photometric)
+        check(f"tifffile 1 bit, {name}", path, world, None, extra=("--spacing", "0.02", "--lower", "0.5"), grey=bone)
+    if needs("imagecodecs"):
+        for name in ("lzw", "packbits"):
+            path = dir / f"{name}.tif"
+            tifffile.imwrite(path, GREY, photometric="minisblack", compression=name)
+            check(f"tifffile {name}", path, world, None, extra=("--spacing", "0.02"), grey=GREY)
     tifffile.imwrite(dir / "float.tif", GREY.astype(np.float32), photometric="minisblack")
     check("tifffile float32", dir / "float.tif", world, None, extra=("--spacing", "0.02"))
     tifffile.imwrite(dir / "ome.ome.tif", GREY, metadata={"axes": "ZYX", "PhysicalSizeX": 20.0, "PhysicalSizeXUnit": "µm", "PhysicalSizeY": 20.0, "PhysicalSizeYUnit": "µm", "PhysicalSizeZ": 50.0, "PhysicalSizeZUnit": "µm"})
@@ -212,19 +239,16 @@ def pillow_files(dir):
         for k, page in enumerate(bytes_):
             Image.fromarray(page).save(folder / f"slice{k}.{kind}")
         (folder / "slice_rec.log").write_text("[Reconstruction]\nPixel Size (um)=20.0\n")
-        info = ask("info", folder)
-        assert np.allclose(info["spacing_mm"], 0.02), info
-        check(f"Pillow {kind} slices with NRecon's log", folder, bytes_ * 0, (0.02,) * 3) if False else None
-        with tempfile.TemporaryDirectory() as out:
-            import nibabel
-
-            ask("segment", folder, "-o", out, "--lower", 100, "--keep-all")
-            found = np.asarray(nibabel.load(pathlib.Path(out) / "mask.nii.gz").dataobj).T
-        if (found * 200 == bytes_).all():
-            print(f"ok       Pillow {kind} slices with NRecon's log")
-        else:
-            FAILED.append(kind)
-            print(f"FAILED   Pillow {kind} slices")
+        check(f"Pillow {kind} slices with NRecon's log", folder, bytes_ // 200, (0.02,) * 3, extra=("--lower", 100), grey=bytes_)
+    folder = dir / "png16"
+    folder.mkdir()
+    wide = (GREY.astype(np.int32) + 1000) * 7
+    assert wide.max() > 32767
+    for k, page in enumerate(wide.astype(np.uint16)):
+        Image.fromarray(page).save(folder / f"slice{k}.png")
+    lower = (2999.5 + 1000) * 7
+    world = (GREY > 2999.5).astype(np.uint8)
+    check("Pillow png slices of 16 bits", folder, world, None, extra=("--spacing", "0.02", "--lower", lower), grey=wide)
 
 
 def aim_files(dir):
@@ -269,6 +293,26 @@ def aim_files(dir):
             print(f"{'ok      ' if same else 'FAILED  '} aimio {name}")
             if not same:
                 FAILED.append(name)
+    path = dir / "float.AIM"
+    aim.write_aim(str(path), GREY.astype(np.float32) / 16, meta={"dimensions": GREY.shape[::-1], "element_size": (0.082,) * 3}, unit="native")
+    check("aimio float", path, world, (0.082,) * 3, extra=("--lower", 2999.5 / 16), grey=GREY / 16)
+    # What aimio reads and does not write: the older headers. Both read the same file.
+    for version, size in (("1.0", 92), ("1.1", 96)):
+        path = dir / f"v{version}.AIM"
+        path.write_bytes(aim_v1(size))
+        theirs, meta = aim.read_aim(str(path))
+        assert (theirs == GREY).all(), f"aimio reads version {version} differently"
+        check(f"AIM version {version}, as aimio reads it", path, (theirs > 2999.5).astype(np.uint8), meta["element_size"], grey=theirs)
+
+
+def aim_v1(size):
+    """An AIM of version 1.0 (a header of 92 bytes) or 1.1 (96)."""
+    header = bytearray(size)
+    struct.pack_into("<i3i3i", header, 16, (2 << 16) + 2, *GREY.shape[::-1], 0, 0, 0)
+    # A VAX float: IEEE's bits of four times the number, 16-bit words swapped.
+    edge = struct.pack("<f", 4 * 0.082)
+    header[68:72] = edge[2:] + edge[:2]
+    return struct.pack("<4i", 16, size, 0, GREY.nbytes) + bytes(header) + GREY.tobytes()
 
 
 def main():

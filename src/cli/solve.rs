@@ -122,8 +122,9 @@ pub struct SolveSettings {
     /// Also count mechanisms (motions that cost next to no energy); takes a factorisation, for small models
     #[arg(long)]
     mechanisms: bool,
-    /// voxel-fe: fields to write, comma-separated, as NIfTI on the scan's grid and fields.vti for ParaView: displacement
-    /// (mm), sed (strain energy density, MPa), von-mises (MPa), fraction (bone in an element) [default: none]
+    /// Fields to write, comma-separated: displacement (mm), sed (strain energy density, MPa), von-mises (MPa, voxel-fe only),
+    /// fraction (bone in an element, weight of a site). Of voxel-fe as NIfTI on the scan's grid and fields.vti for ParaView,
+    /// of a lattice as fields-LATTICE.vtk, by site [default: none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::choice::<Field>(&["displacement", "sed", "von-mises", "fraction"]))]
     fields: Vec<Field>,
     /// voxel-fe: find the failure load, where 2 % of the bone exceed an effective strain of 0.007 (Pistoia et al. 2002)

@@ -1,7 +1,8 @@
-//! Owns exports for ParaView and OVITO: legacy VTK files, binary (big-endian).
+//! Owns lattices for ParaView and OVITO, plain or with their fields: legacy VTK files, binary (big-endian).
 
 use crate::error::Result;
 use crate::io::atomic;
+use crate::stage::solve::fields::SiteFields;
 use crate::topology::pieces::Pieces;
 use crate::topology::placement::Frame;
 use crate::topology::sites::Sites;
@@ -37,6 +38,43 @@ pub fn write_pieces(path: &Path, pieces: &Pieces) -> Result<()> {
         &bonds,
         &pieces.fractions,
     )
+}
+
+/// Fields of a solved lattice, as points with values: mm and MPa.
+pub fn write_fields(path: &Path, title: &str, fields: &SiteFields) -> Result<()> {
+    let sites = fields.at_mm.len();
+    let scalars = [("sed_mpa", &fields.sed_mpa), ("fraction", &fields.fraction)];
+    atomic::write_with(path, |out| {
+        writeln!(out, "# vtk DataFile Version 3.0\n{title}")?;
+        writeln!(out, "BINARY\nDATASET POLYDATA\nPOINTS {sites} float")?;
+        write_floats(out, fields.at_mm.as_flattened())?;
+        // Viewers show points only as vertices.
+        writeln!(out, "\nVERTICES {sites} {}", 2 * sites)?;
+        for site in 0..sites as i32 {
+            out.write_all(&1i32.to_be_bytes())?;
+            out.write_all(&site.to_be_bytes())?;
+        }
+        writeln!(out, "\nPOINT_DATA {sites}")?;
+        if let Some(u) = &fields.displacement_mm {
+            writeln!(out, "VECTORS displacement_mm float")?;
+            write_floats(out, u.as_flattened())?;
+            writeln!(out)?;
+        }
+        for (name, values) in scalars {
+            if let Some(values) = values {
+                writeln!(out, "SCALARS {name} float 1\nLOOKUP_TABLE default")?;
+                write_floats(out, values)?;
+                writeln!(out)?;
+            }
+        }
+        Ok(())
+    })
+}
+
+fn write_floats(out: &mut impl Write, values: &[f64]) -> std::io::Result<()> {
+    values
+        .iter()
+        .try_for_each(|v| out.write_all(&(*v as f32).to_be_bytes()))
 }
 
 fn write(

@@ -136,12 +136,8 @@ struct Written<'a> {
 
 impl Written<'_> {
     fn path(&self, case: &Case, extension: &str) -> PathBuf {
-        self.dir.join(format!(
-            "lattice-{}-{}-{}.{extension}",
-            case.structure.name(),
-            case.boundary.name(),
-            case.lp_mm
-        ))
+        self.dir
+            .join(format!("lattice-{}.{extension}", case.stem()))
     }
 
     fn sites(&self, case: &Case, sites: &Sites) -> Result<()> {

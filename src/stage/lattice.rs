@@ -99,6 +99,12 @@ impl LatticeParams {
 }
 
 impl Case {
+    /// Part of the names of its files: `sc-firm-0.06`.
+    pub fn stem(&self) -> String {
+        let (structure, boundary) = (self.structure.name(), self.boundary.name());
+        format!("{structure}-{boundary}-{}", self.lp_mm)
+    }
+
     /// Whether its sites are connected pieces of bone: graded SC lattices.
     pub fn in_pieces(&self) -> bool {
         self.boundary == Boundary::Graded && self.structure == Structure::Sc

@@ -3,6 +3,7 @@
 
 python3 tests/peers/fields.py target/release/bonepd-ct
 """
+import json
 import pathlib
 import subprocess
 import sys
@@ -12,6 +13,7 @@ try:
     import nibabel
     import numpy
     from vtk.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOLegacy import vtkPolyDataReader
     from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 except ImportError as missing:
     print(f"skipped: {missing}; pip install vtk nibabel")
@@ -71,3 +73,26 @@ for flags in (["--turn", "x"], ["--align", "0.3,0.2,1"], ["--resample", "0.025"]
     cells = ((found + 0.5) * image.GetSpacing()) @ axes.T + image.GetOrigin()
     assert numpy.allclose(cells, world, atol=1e-5), (flags, abs(cells - world).max())
     print(f"{' '.join(flags)}: {100 * share:.2f} % of the elements' centres lie in bone of the scan")
+
+# A lattice's fields, by site: energies add up to the modulus, ends are where they were brought to.
+subprocess.run([program, "segment", work / "scan.nii.gz", "-o", out, "--lower", "1", "--quiet"], check=True)
+flags = ["--lp", "0.1", "--boundary", "floppy", "--fields", "displacement,sed", "--tolerance", "1e-8", "--json", "--quiet"]
+done = subprocess.run([program, "solve", out, *flags], check=True, capture_output=True, text=True)
+row = json.loads(done.stdout)[-1]
+reader = vtkPolyDataReader()
+reader.SetFileName(str(out / "fields-sc-floppy-0.1.vtk"))
+reader.ReadAllScalarsOn()
+reader.ReadAllVectorsOn()
+reader.Update()
+points = reader.GetOutput()
+values = points.GetPointData()
+z = vtk_to_numpy(points.GetPoints().GetData())[:, 2]
+u = vtk_to_numpy(values.GetArray("displacement_mm"))[:, 2]
+sed = vtk_to_numpy(values.GetArray("sed_mpa")).astype(float)
+assert len(z) == row["sites"] == points.GetNumberOfVerts(), (len(z), row["sites"])
+gauge, moved = numpy.ptp(z), numpy.ptp(u)
+assert abs(moved / gauge / abs(row["strain"]) - 1) < 1e-5, (gauge, moved)
+area = row["tv_mm3"] / (bone.shape[2] * 0.03)
+modulus = 2 * sed.sum() * 0.1**3 * gauge / (area * moved**2)
+assert abs(modulus / row["e_app_mpa"] - 1) < 1e-5, (modulus, row["e_app_mpa"])
+print(f"lattice: the energies of {len(z)} sites that VTK reads make {modulus:.4f} MPa, the row says {row['e_app_mpa']:.4f}")

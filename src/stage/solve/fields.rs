@@ -1,4 +1,5 @@
-//! Owns what of a solved voxel model is kept on request: fields on the scan's grid, and the failure load.
+//! Owns what of a solved model is kept on request: of voxel elements fields on the scan's grid, and the failure load; of a
+//! lattice values at its sites.
 
 use crate::error::Result;
 use crate::mask::resample;
@@ -7,10 +8,11 @@ use crate::physics::hex8::fields::{Brick, Kind, bricks};
 use crate::stage::solve::SolveParams;
 use crate::stage::solve::bricks::{Bricks, rule};
 use crate::stage::solve::tissue::Tissue;
+use crate::topology::placement::Frame;
 use crate::volume::{Specimen, Volume};
 use serde::{Deserialize, Serialize};
 
-/// A field of the voxel model.
+/// A field of a solved model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Field {
@@ -35,6 +37,43 @@ pub struct FieldVolume {
 pub struct Recorded {
     pub fields: Vec<FieldVolume>,
     pub failure: Option<Failure>,
+}
+
+/// What was asked for of a lattice, by site.
+#[derive(Debug, Clone)]
+pub struct SiteFields {
+    /// Places of the sites, from the corner of the specimen.
+    pub at_mm: Vec<[f64; 3]>,
+    pub displacement_mm: Option<Vec<[f64; 3]>>,
+    /// A site's energy over the volume of a whole site's cell.
+    pub sed_mpa: Option<Vec<f64>>,
+    /// A site's share of a whole site's stiffness.
+    pub fraction: Option<Vec<f64>>,
+}
+
+impl SiteFields {
+    /// Of a solved lattice, as far as `fields` ask for them; None where none is asked for. `energy_nmm` and `fraction` are
+    /// those of a site.
+    pub fn of(
+        fields: &[Field],
+        (frame, indices): (&Frame, &[[i32; 3]]),
+        u: &[[f64; 3]],
+        energy_nmm: impl Fn(usize) -> f64,
+        fraction: impl Fn(usize) -> f64,
+    ) -> Option<SiteFields> {
+        if fields.is_empty() {
+            return None;
+        }
+        let asked = |field| fields.contains(&field);
+        let cell_mm3 = frame.structure.cell_volume() * frame.lp_mm.powi(3);
+        let sites = || 0..indices.len();
+        Some(SiteFields {
+            at_mm: indices.iter().map(|at| frame.position_mm(*at)).collect(),
+            displacement_mm: asked(Field::Displacement).then(|| u.to_vec()),
+            sed_mpa: asked(Field::Sed).then(|| sites().map(|s| energy_nmm(s) / cell_mm3).collect()),
+            fraction: asked(Field::Fraction).then(|| sites().map(&fraction).collect()),
+        })
+    }
 }
 
 /// Fields and failure load of a solved model, as far as the settings ask for them.

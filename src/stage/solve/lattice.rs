@@ -15,6 +15,7 @@ use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
 use crate::solve::fallback::minimise_or_fall_back;
 use crate::stage::lattice::{Boundary, Case, build_of, build_pieces};
+use crate::stage::solve::fields::SiteFields;
 use crate::stage::solve::mechanisms::mechanisms;
 use crate::stage::solve::solved::{Moduli, Solved};
 use crate::stage::solve::tissue::Tissue;
@@ -34,6 +35,16 @@ pub fn solve_lattice(
     params: &SolveParams,
     observe: impl FnMut(CgStep),
 ) -> Result<Solved> {
+    Ok(solve_recorded(specimen, case, params, observe)?.0)
+}
+
+/// The same, with the fields that the settings ask for.
+pub fn solve_recorded(
+    specimen: &Specimen,
+    case: &Case,
+    params: &SolveParams,
+    observe: impl FnMut(CgStep),
+) -> Result<(Solved, Option<SiteFields>)> {
     params.check()?;
     if params.load == Load::Stiffness {
         return Err(Error::setting(
@@ -62,7 +73,7 @@ pub fn solve_lattice(
         }
         let pieces = build_pieces(specimen, case, params.axis, params.grip_mm)?;
         if pieces.is_empty() {
-            return Ok(Solved::disconnected(pieces.dropped));
+            return Ok((Solved::disconnected(pieces.dropped), None));
         }
         let laid = Laid {
             frame: &pieces.frame,
@@ -76,13 +87,17 @@ pub fn solve_lattice(
             model: &model,
             counts: None,
         };
-        return Ok(solve_model(
+        let (solved, u) = solve_model(
             &model, &springs, &stress, &laid, specimen, case, params, observe,
-        ));
+        );
+        let energy = |s| model.site_energy(&u, s);
+        let fraction = |s: usize| f64::from(pieces.fractions[s]);
+        let fields = SiteFields::of(&params.fields, laid.places(), &u, energy, fraction);
+        return Ok((solved, fields));
     }
     let sites = build_of(specimen, mixed, case, params.axis, params.grip_mm)?;
     if sites.is_empty() {
-        return Ok(Solved::disconnected(sites.dropped));
+        return Ok((Solved::disconnected(sites.dropped), None));
     }
     let laid = Laid {
         frame: &sites.frame,
@@ -104,13 +119,17 @@ pub fn solve_lattice(
         true => Some(count_mechanisms(&model, &laid, moduli, params)?),
         false => None,
     };
-    let solved = solve_model(
+    let (solved, u) = solve_model(
         &model, &springs, &stress, &laid, specimen, case, params, observe,
     );
-    Ok(Solved {
+    let energy = |s| model.site_energy(&u, s);
+    let fraction = |s: usize| sites.weights.as_ref().map_or(1.0, |weights| weights[s]);
+    let fields = SiteFields::of(&params.fields, laid.places(), &u, energy, fraction);
+    let solved = Solved {
         mechanisms,
         ..solved
-    })
+    };
+    Ok((solved, fields))
 }
 
 /// A bond spans up to two grid steps along an axis (SC: one); volumetric sums couple the ends of two bonds.
@@ -134,6 +153,10 @@ struct Laid<'a> {
 }
 
 impl Laid<'_> {
+    fn places(&self) -> (&Frame, &[[i32; 3]]) {
+        (self.frame, self.indices)
+    }
+
     fn plane(&self, site: usize) -> i32 {
         self.indices[site][self.frame.axis.index()]
     }
@@ -181,7 +204,7 @@ fn solve_model(
     case: &Case,
     params: &SolveParams,
     observe: impl FnMut(CgStep),
-) -> Solved {
+) -> (Solved, Vec<[f64; 3]>) {
     let loaded = Loaded {
         gauge_mm: laid.gauge_mm(),
         area_mm2: specimen.area_mm2(params.axis),
@@ -198,7 +221,7 @@ fn solve_model(
     let amg = Amg::new(springs, &held, &AmgParams::lattice(case.lp_mm));
     let info = minimise_or_fall_back(model, &held, &amg, &mut u, &cg, goal, observe);
     drop(amg);
-    Solved {
+    let solved = Solved {
         sites: laid.indices.len(),
         dropped: laid.dropped,
         unknowns: held.free::<3>(),
@@ -207,7 +230,8 @@ fn solve_model(
         ended: info.ended,
         moduli: assess(model, stress, laid, &loaded, &u, &info),
         mechanisms: None,
-    }
+    };
+    (solved, u)
 }
 
 /// The solid that a lattice is laid out for, and each voxel's modulus over it.

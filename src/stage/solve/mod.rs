@@ -123,7 +123,7 @@ pub struct SolveParams {
     pub coarsen: usize,
     /// Count mechanisms, too; takes a factorisation.
     pub mechanisms: bool,
-    /// voxel-fe: fields to write.
+    /// Fields to write.
     pub fields: Vec<Field>,
     /// voxel-fe: find the failure load by this criterion.
     pub pistoia: Option<Pistoia>,
@@ -226,11 +226,19 @@ impl SolveParams {
             pistoia.check()?;
         }
         let recorded = !self.fields.is_empty() || self.pistoia.is_some();
-        if recorded && (self.method == Method::Lattice || self.load == Load::Stiffness) {
+        if recorded && self.load == Load::Stiffness {
             return Err(Error::setting(
                 "solve.fields",
-                "fields and the failure load come from one load on voxel elements",
-                "add --method voxel-fe with --load uniaxial or confined, or leave --fields and --failure out",
+                "fields and the failure load come from one load",
+                "add --load uniaxial or confined, or leave --fields and --failure out",
+            ));
+        }
+        let of_elements = self.fields.contains(&Field::VonMises) || self.pistoia.is_some();
+        if of_elements && self.method == Method::Lattice {
+            return Err(Error::setting(
+                "solve.fields",
+                "the failure load and von Mises stresses come from voxel elements",
+                "add --method voxel-fe, or ask for --fields displacement,sed,fraction of a lattice",
             ));
         }
         if self.max_iterations == 0 {

@@ -26,7 +26,7 @@ const PIECE: f64 = 360.0;
 /// Edge of multigrid's boxes in nodes.
 const BOX: usize = 5;
 
-/// Bytes of a solve beyond the specimen, at their highest.
+/// Bytes of a solve beyond the specimen, at their highest; 0 where there is nothing to solve.
 ///
 /// # Errors
 /// Settings that do not fit the specimen.
@@ -57,6 +57,9 @@ pub fn of_voxel_fe(specimen: &Specimen, params: &SolveParams) -> f64 {
             Counts::of(&Volume::from_vec(fractions.grid, bone))
         }
     };
+    if counts.elements == 0.0 {
+        return 0.0;
+    }
     let refine = params.refine as f64;
     let nodes = counts.nodes_refined(refine);
     // Finer boxes fill in the same proportion to nodes as those of the finest count that was made.
@@ -166,6 +169,28 @@ pub fn of(specimen: &Specimen, case: Option<&Case>, params: &SolveParams) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_to_solve_needs_nothing() {
+        // One voxel in 8³: a coarse element of it is mostly pore, and left out.
+        let grid = Grid::new([8; 3], [0.02; 3]);
+        let mut voxels = vec![0u8; grid.len()];
+        voxels[77] = 1;
+        let specimen = Specimen {
+            name: "speck".into(),
+            grey: None,
+            bone: Volume::from_vec(grid, voxels),
+            tv_mm3: 1.0,
+            tv_definition: "box".into(),
+        };
+        let coarse = SolveParams {
+            method: Method::VoxelFe,
+            coarsen: 4,
+            ..SolveParams::default()
+        };
+        assert_eq!(of_voxel_fe(&specimen, &coarse), 0.0);
+        assert!(of_voxel_fe(&specimen, &SolveParams::default()) > 0.0);
+    }
 
     #[test]
     fn nodes_of_refined_voxels_are_counted_without_refining() {

@@ -194,8 +194,17 @@ fn a_run_killed_twice_ends_as_one_that_was_not() {
     assert_eq!(code, 1);
     assert!(stderr.contains("failed: broken, empty"), "{stderr}");
     assert!(kill_after(&args(text(&cut)), &cut, 5));
+    // What a writer leaves that is killed in the midst.
+    let halves = ["", "s1", "report"].map(|folder| cut.join(folder).join(".writing-k1LLed"));
+    for half in &halves {
+        fs::create_dir_all(half.parent().unwrap()).unwrap();
+        fs::write(half, "half a table").unwrap();
+    }
     assert!(kill_after(&args(text(&cut)), &cut, 5));
     assert_eq!(run(&args(text(&cut))).0, 1);
+    for half in halves {
+        assert!(!half.exists(), "{}", half.display());
+    }
     assert_eq!(rows(&whole).len(), 18 * 6);
     assert_eq!(timeless(&cut), timeless(&whole));
     let failed = |out: &Path| fs::read(out.join("failed.csv")).unwrap();
@@ -211,9 +220,10 @@ fn a_run_killed_twice_ends_as_one_that_was_not() {
 fn a_manifest_names_scans_groups_and_settings() {
     let (dir, scans, recipe) = cohort(2);
     let (manifest, out) = (dir.path().join("cohort.csv"), dir.path().join("out"));
+    // As a spreadsheet writes it where the comma is the decimal mark.
     fs::write(
         &manifest,
-        "path,name,group,subject,spacing_mm\nscans/s1.nii.gz,left,OA,p1,0.06\nscans/s2.nii.gz,right,,p1,\n",
+        "path;name;group;subject;spacing_mm\r\nscans/s1.nii.gz;left;OA;p1;0,06\r\nscans/s2.nii.gz;right;;p1;\r\n",
     )
     .unwrap();
     let (code, _, stderr) = run(&["run", text(&recipe), text(&manifest), "-o", text(&out)]);
@@ -258,6 +268,30 @@ fn a_dry_run_lists_scans_with_their_needs_and_writes_nothing() {
     assert_eq!(plan[1]["scan"], "s2");
     assert_eq!(plan[1]["state"], "planned");
     assert!(!out.exists());
+}
+
+/// Half the scan is bone, in two halves that do not meet.
+#[test]
+fn a_scan_that_bears_no_load_is_told_as_such_and_named_once() {
+    let (dir, scans, recipe) = cohort(0);
+    let grid = Grid::new([12; 3], [0.05; 3]);
+    let voxels = (0..grid.len()).map(|at| if (at / 144) % 7 < 3 { 1000i16 } else { 0 });
+    let volume = Volume::from_vec(grid, voxels.collect());
+    nifti::write(&scans.join("gap.nii.gz"), &volume).unwrap();
+    let out = dir.path().join("out");
+    let words = ["run", text(&recipe), text(&scans), "-o", text(&out)];
+    let floppy = [&words[..], &["--boundary", "floppy"]].concat();
+    let (code, _, said) = run(&[&floppy[..], &["--dry-run"]].concat());
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("no bone from face to face"), "{said}");
+    let (code, _, said) = run(&floppy);
+    assert_eq!(code, 0, "{said}");
+    let warning = said.lines().find(|line| line.contains("removed")).unwrap();
+    assert_eq!(warning.matches("gap").count(), 1, "{warning}");
+    assert!(
+        said.contains("gap: 2 rows; floppy 0.15 mm: E_app 0.000 MPa"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -6,9 +6,10 @@ use bonepd_ct::io::{nifti, scan, table};
 use bonepd_ct::measure::pistoia::Pistoia;
 use bonepd_ct::measure::row::Row;
 use bonepd_ct::physics::material::{Label, Law, Material};
+use bonepd_ct::stage::lattice::{Boundary, Case, LatticeParams, Structure};
 use bonepd_ct::stage::solve::fields::{Field, Recorded};
 use bonepd_ct::stage::solve::voxel_fe::solve_recorded;
-use bonepd_ct::stage::solve::{Method, SolveParams};
+use bonepd_ct::stage::solve::{Method, SolveParams, lattice};
 use bonepd_ct::volume::{Specimen, Volume};
 
 /// A solid block, its upper half another label.
@@ -134,7 +135,7 @@ fn the_weaker_layer_fails_first() {
 }
 
 #[test]
-fn nothing_is_recorded_unasked_and_lattices_have_no_fields() {
+fn nothing_is_recorded_unasked_and_lattices_have_no_stresses() {
     let plain = SolveParams {
         fields: vec![],
         pistoia: None,
@@ -172,6 +173,7 @@ fn fields_are_written_on_the_scans_grid() {
     let ok = |args: &[&str]| {
         let (code, _, stderr) = run(args);
         assert_eq!(code, 0, "{stderr}");
+        stderr
     };
     ok(&["segment", &scan, "-o", &out, "--lower", "1"]);
     let solve = [
@@ -183,7 +185,7 @@ fn fields_are_written_on_the_scans_grid() {
         "sed,displacement",
         "--failure",
     ];
-    ok(&solve);
+    let said = ok(&solve);
     let field = scan::read(&dir.path().join("out/field-sed-mpa.nii.gz"), None)
         .unwrap()
         .volume;
@@ -200,9 +202,100 @@ fn fields_are_written_on_the_scans_grid() {
     assert!(!dir.path().join("out/field-von-mises-mpa.nii.gz").exists());
     let vti = std::fs::read(dir.path().join("out/fields.vti")).unwrap();
     assert!(String::from_utf8_lossy(&vti).contains("Origin=\"2.99 -2.01 0.99\""));
+    assert!(said.contains("failure load 0.067 N"), "{said}");
     let rows: Vec<Row> = table::read(&dir.path().join("out/results.csv")).unwrap();
     let load = rows[0].failure_load_n.unwrap();
     assert!((load / (7.0 * 0.12 * 0.08) - 1.0).abs() < 1e-2, "{load}");
-    let (code, _, stderr) = run(&["solve", &out, "--fields", "sed"]);
+    let (code, _, stderr) = run(&["solve", &out, "--fields", "sed,von-mises"]);
     assert!(code == 2 && stderr.contains("voxel-fe"), "{stderr}");
+}
+
+/// Sites' energies add up to the energy behind the modulus, the grips are where they were brought to, and a file holds it.
+#[test]
+fn a_lattice_has_its_fields_at_its_sites() {
+    let specimen = crate::laws::irregular_specimen();
+    for (structure, boundary, poisson) in [
+        (Structure::Sc, Boundary::Floppy, 0.3),
+        (Structure::Sc, Boundary::Firm, 0.25),
+        (Structure::Sc, Boundary::Graded, 0.3),
+        (Structure::Bcc, Boundary::Graded, 0.2),
+    ] {
+        let case = Case {
+            structure,
+            lp_mm: 0.05,
+            boundary,
+            registration_mm: [0.0; 3],
+        };
+        let params = SolveParams {
+            poisson,
+            tolerance: 1e-9,
+            fields: vec![Field::Displacement, Field::Sed, Field::Fraction],
+            ..SolveParams::default()
+        };
+        let (solved, fields) = lattice::solve_recorded(&specimen, &case, &params, |_| ()).unwrap();
+        let fields = fields.unwrap();
+        let u = fields.displacement_mm.as_ref().unwrap();
+        let sed = fields.sed_mpa.as_ref().unwrap();
+        assert_eq!([fields.at_mm.len(), u.len(), sed.len()], [solved.sites; 3]);
+        let along = |rows: &[[f64; 3]]| {
+            let z = rows.iter().map(|row| row[2]);
+            [
+                z.clone().fold(f64::MAX, f64::min),
+                z.fold(f64::MIN, f64::max),
+            ]
+        };
+        let [low, high] = along(u);
+        let moved = high - low;
+        let gauge = moved / -params.strain;
+        let [bottom, top] = along(&fields.at_mm);
+        assert!(gauge > 0.0 && gauge < top - bottom + 1e-12, "{gauge}");
+        let cell = case.structure.cell_volume() * case.lp_mm.powi(3);
+        let energy: f64 = sed.iter().map(|sed| sed * cell).sum();
+        let area = specimen.area_mm2(params.axis);
+        let from_fields = 2.0 * energy * gauge / (area * moved.powi(2));
+        near(from_fields, solved.moduli.from_energy_mpa);
+        let fraction = fields.fraction.as_ref().unwrap();
+        let least = fraction.iter().copied().fold(f64::MAX, f64::min);
+        assert_eq!(least < 1.0, boundary == Boundary::Graded, "{least}");
+    }
+    let plain = SolveParams::default();
+    let case = LatticeParams::default().cases()[0];
+    let (_, fields) = lattice::solve_recorded(&specimen, &case, &plain, |_| ()).unwrap();
+    assert!(fields.is_none());
+}
+
+#[test]
+fn fields_of_a_lattice_are_written_by_the_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let (scan, out) = (dir.path().join("scan.nii"), dir.path().join("out"));
+    let image = Volume::from_vec(Grid::new([10; 3], [0.02; 3]), vec![1u8; 1000]);
+    nifti::write(&scan, &image).unwrap();
+    let (scan, folder) = (scan.to_str().unwrap(), out.to_str().unwrap());
+    let ok = |args: &[&str]| assert_eq!(run(args).0, 0);
+    ok(&["segment", scan, "-o", folder, "--lower", "1"]);
+    let lattice = ["solve", folder, "--lp", "0.05", "--boundary", "floppy"];
+    ok(&lattice);
+    assert!(!out.join("fields-sc-floppy-0.05.vtk").exists());
+    ok(&[&lattice[..], &["--fields", "sed,displacement"]].concat());
+    let bytes = std::fs::read(out.join("fields-sc-floppy-0.05.vtk")).unwrap();
+    let text = String::from_utf8_lossy(&bytes);
+    let head = "# vtk DataFile Version 3.0\nsc-floppy-0.05\nBINARY\nDATASET POLYDATA\nPOINTS ";
+    let sites: usize = text
+        .strip_prefix(head)
+        .unwrap()
+        .split(' ')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
+    for part in ["VECTORS displacement_mm float", "SCALARS sed_mpa float 1"] {
+        assert!(text.contains(part), "{part}");
+    }
+    assert!(!text.contains("fraction"));
+    // Three floats of place, two integers of a vertex, three floats and one of values.
+    assert!(
+        bytes.len() > sites * 4 * (3 + 2 + 3 + 1) && bytes.len() < sites * 36 + 400,
+        "{}",
+        bytes.len()
+    );
 }

@@ -66,7 +66,6 @@ pub fn run(args: &RunArgs, session: &Session, json: bool) -> Result<Outcome> {
     let selection = Selection {
         recursive: args.recursive,
         pattern: args.pattern.clone(),
-        only: args.only.clone(),
     };
     let resources = Resources {
         jobs: args.jobs.into(),
@@ -77,6 +76,7 @@ pub fn run(args: &RunArgs, session: &Session, json: bool) -> Result<Outcome> {
         &args.inputs,
         &args.out,
         &selection,
+        args.only.as_deref(),
         &resources,
         session,
     )?;

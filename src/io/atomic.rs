@@ -1,9 +1,13 @@
 //! Owns the writing of whole files: a temporary file in the same folder, synced, then renamed. A reader never meets
-//! half a file, and a failed write leaves nothing behind.
+//! half a file, and a failed write leaves nothing behind. What a killed program left is known by its name and by no one
+//! holding its lock: [`sweep`] clears it away.
 
 use crate::error::{Error, Result};
 use std::io::{BufWriter, Write};
 use std::path::Path;
+use tempfile::NamedTempFile;
+
+const PREFIX: &str = ".writing-";
 
 /// Writes `path` through `fill`. Folders on the way are created.
 pub fn write_with(
@@ -40,9 +44,7 @@ fn try_write(
         _ => Path::new("."),
     };
     std::fs::create_dir_all(dir)?;
-    let mut file = tempfile::Builder::new()
-        .prefix(".writing-")
-        .tempfile_in(dir)?;
+    let mut file = temporary(dir, "")?;
     let mut out = BufWriter::with_capacity(1 << 20, file.as_file_mut());
     fill(&mut out)?;
     out.flush()?;
@@ -50,12 +52,42 @@ fn try_write(
     persist(file, path)
 }
 
+/// A temporary file of `dir`, locked as long as its writer lives (on Unix; elsewhere a lock keeps out its own writer, too).
+pub fn temporary(dir: &Path, suffix: &str) -> std::io::Result<NamedTempFile> {
+    loop {
+        let mut builder = tempfile::Builder::new();
+        let file = builder.prefix(PREFIX).suffix(suffix).tempfile_in(dir)?;
+        // File systems without locks refuse them to `sweep`, too.
+        if cfg!(unix) {
+            let _ = file.as_file().lock();
+        }
+        // Swept before it was locked: another.
+        if file.path().exists() {
+            return Ok(file);
+        }
+    }
+}
+
+/// Removes what writers that were killed have left in `dir`; files that are being written stay.
+pub fn sweep(dir: &Path) {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let left = entries.filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX));
+    for path in left.map(|entry| entry.path()) {
+        if cfg!(unix)
+            && let Ok(file) = std::fs::File::open(&path)
+            && file.try_lock().is_ok()
+        {
+            let _ = std::fs::remove_file(&path);
+        }
+    }
+}
+
 /// Syncs a finished temporary file (of the same folder) and gives it its name.
-pub fn keep(file: tempfile::NamedTempFile, path: &Path) -> Result<()> {
+pub fn keep(file: NamedTempFile, path: &Path) -> Result<()> {
     persist(file, path).map_err(|e| unwritable(path, &e))
 }
 
-fn persist(file: tempfile::NamedTempFile, path: &Path) -> std::io::Result<()> {
+fn persist(file: NamedTempFile, path: &Path) -> std::io::Result<()> {
     readable_by_all(file.as_file())?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
@@ -106,6 +138,23 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         let names = std::fs::read_dir(path.parent().unwrap()).unwrap().count();
         assert_eq!(names, 1);
+    }
+
+    #[test]
+    fn what_a_killed_writer_left_is_swept_what_is_being_written_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let left = dir.path().join(".writing-Ab3xYz");
+        std::fs::write(&left, "half a table").unwrap();
+        std::fs::write(dir.path().join(".hidden"), "of the user").unwrap();
+        let mut living = temporary(dir.path(), "").unwrap();
+        sweep(dir.path());
+        assert!(!left.exists() && living.path().exists());
+        living.write_all(b"whole").unwrap();
+        let path = dir.path().join("whole");
+        keep(living, &path).unwrap();
+        sweep(dir.path());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "whole");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
     }
 
     #[cfg(unix)]

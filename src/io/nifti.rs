@@ -282,11 +282,8 @@ where
     crate::io::atomic::create_dir(dir)?;
     let gz = path.extension().is_some_and(|e| e == "gz");
     // The crate writes by name and eats dots in stems: a plain temporary name, then rename.
-    let file = tempfile::Builder::new()
-        .prefix("writing")
-        .suffix(if gz { ".nii.gz" } else { ".nii" })
-        .tempfile_in(dir)
-        .map_err(|e| failed(&e))?;
+    let suffix = if gz { ".nii.gz" } else { ".nii" };
+    let file = crate::io::atomic::temporary(dir, suffix).map_err(|e| failed(&e))?;
     WriterOptions::new(file.path())
         .reference_header(&header_of(volume))
         .write_nifti(&volume.values.t())

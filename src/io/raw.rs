@@ -160,18 +160,34 @@ pub fn read(
     let mut left = bytes;
     while left > 0 {
         let part = left.min(chunk.len());
-        source.read_exact(&mut chunk[..part]).map_err(|e| {
-            let at = bytes - left;
-            Error::file(
+        let (got, broken) = fill(source, &mut chunk[..part]);
+        if got < part {
+            let at = bytes - left + got;
+            let why = broken.map_or_else(String::new, |e| format!(" ({e})"));
+            return Err(Error::file(
                 path,
-                format!("voxel data end or break off after {at} of {bytes} bytes ({e})"),
+                format!("voxel data end or break off after {at} of {bytes} bytes{why}"),
                 "the file is truncated or damaged: copy or export it again",
-            )
-        })?;
+            ));
+        }
         decode(&chunk[..part], layout, &mut values);
         left -= part;
     }
     Ok(values)
+}
+
+/// Fills `chunk` as far as `source` goes: how many bytes came, and what broke it off, if it did not just end.
+fn fill(source: &mut dyn Read, chunk: &mut [u8]) -> (usize, Option<std::io::Error>) {
+    let mut got = 0;
+    while got < chunk.len() {
+        match source.read(&mut chunk[got..]) {
+            Ok(0) => return (got, None),
+            Ok(n) => got += n,
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(e) => return (got, Some(e)),
+        }
+    }
+    (got, None)
 }
 
 /// Appends the voxels in `bytes` (a whole number of them).
@@ -254,6 +270,6 @@ mod tests {
     fn truncation_says_where() {
         let l = layout(Scalar::U8, false, [10, 10, 10]);
         let e = read(&mut &[0u8; 999][..], &l, Path::new("t"), 1000, false).unwrap_err();
-        assert!(e.to_string().contains("of 1000 bytes"), "{e}");
+        assert!(e.to_string().contains("after 999 of 1000 bytes"), "{e}");
     }
 }

@@ -11,7 +11,6 @@ use crate::run::results::Results;
 use crate::run::scans::{self, ScanJob, Selection};
 use crate::run::session::Session;
 use crate::run::{Outcome, adaptive, host, lattice, report, segment, solve};
-use crate::stage::segment::SegmentParams;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -40,21 +39,28 @@ pub struct ScanResult {
 }
 
 /// Takes every scan under `inputs` through segment, lattice and solve into `out/<scan>/`, then writes `out/results.csv`
-/// and `out/report/`. What is up to date is kept. A scan that fails is named in the outcome; the others finish.
+/// and `out/report/`. What is up to date is kept. A scan that fails is named in the outcome; the others finish. With `only`,
+/// one scan is run, and the others keep what they have in the tables.
 ///
 /// # Errors
-/// No scans, an output folder that cannot be written; with a single scan, what is wrong with it.
+/// No scans, none of the name, an output folder that cannot be written; with a single scan, what is wrong with it.
 pub fn cohort(
     recipe: &Recipe,
     inputs: &[PathBuf],
     out: &Path,
     selection: &Selection,
+    only: Option<&str>,
     resources: &Resources,
     session: &Session,
 ) -> Result<(Outcome, Vec<ScanResult>)> {
     let mut segment = recipe.segment.clone();
     segment.keep_grey |= recipe.solve.material.is_some();
-    let jobs = scans::find(inputs, &segment, selection, session)?;
+    let all = scans::find(inputs, &segment, selection, session)?;
+    let names = all.iter().map(|job| job.name.clone()).collect();
+    let jobs = match only {
+        Some(name) => scans::only(&all, name)?,
+        None => all,
+    };
     let estimates: Vec<Estimate> = jobs
         .iter()
         .map(|job| estimate(&job.input, job.segment.spacing_mm, recipe))
@@ -63,10 +69,11 @@ pub fn cohort(
         let results = plan(recipe, &jobs, &estimates, out, session);
         return Ok((outcome(&results), results));
     }
+    atomic::sweep(out);
     let run = Run {
         recipe,
         out,
-        names: all_names(&jobs, inputs, &segment, selection, session)?,
+        names,
         jobs: &jobs,
         session,
         bar: session.bar(jobs.len() as u64, "scans"),
@@ -84,27 +91,6 @@ pub fn cohort(
     );
     run.bar.finish_and_clear();
     run.finish(&estimates)
-}
-
-/// Names of all scans of the inputs, those that `--only` leaves out among them: one scan run anew does not take the others
-/// from the tables.
-fn all_names(
-    jobs: &[ScanJob],
-    inputs: &[PathBuf],
-    segment: &SegmentParams,
-    selection: &Selection,
-    session: &Session,
-) -> Result<Vec<String>> {
-    let name = |job: &ScanJob| job.name.clone();
-    if selection.only.is_none() {
-        return Ok(jobs.iter().map(name).collect());
-    }
-    let all = Selection {
-        only: None,
-        ..selection.clone()
-    };
-    let all = scans::find(inputs, segment, &all, session)?;
-    Ok(all.iter().map(name).collect())
 }
 
 /// A run under way.
@@ -253,15 +239,23 @@ fn failures(jobs: &[ScanJob], done: &[Option<Result<Vec<Row>>>]) -> Vec<Failure>
     failed.collect()
 }
 
+/// How many rows, and the modulus of the last: the mean or the limit of the finest lattices, where there are several.
 fn in_words(rows: &[Row]) -> String {
-    let stalled = rows
-        .iter()
-        .filter(|row| row.converged == Some(false))
-        .count();
-    match stalled {
-        0 => format!("{} rows", rows.len()),
-        n => format!("{} rows, {n} not converged", rows.len()),
-    }
+    let stalled = rows.iter().filter(|row| row.converged == Some(false));
+    let stalled = match stalled.count() {
+        0 => String::new(),
+        n => format!(", {n} not converged"),
+    };
+    let modulus = rows.last().and_then(|row| {
+        let kind = row.boundary.as_deref().unwrap_or(&row.method);
+        let e_app = row.e_app_mpa?;
+        Some(format!("; {kind} {} mm: E_app {e_app:.3} MPa", row.lp_mm))
+    });
+    format!(
+        "{} rows{stalled}{}",
+        rows.len(),
+        modulus.unwrap_or_default()
+    )
 }
 
 /// `target`: the stated error asked for, if any.

@@ -40,6 +40,9 @@ pub struct Estimate {
     pub memory_mib: f64,
     /// None where the voxel size is not known before reading.
     pub time_s: Option<f64>,
+    /// The bone is known, and none of it would bear load.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub no_bone: bool,
 }
 
 impl fmt::Display for Estimate {
@@ -47,6 +50,9 @@ impl fmt::Display for Estimate {
         match self.voxels {
             Some([x, y, z]) => write!(f, "{x} × {y} × {z} voxels, ")?,
             None => write!(f, "size not known before reading, ")?,
+        }
+        if self.no_bone {
+            return write!(f, "no bone from face to face: E_app is 0");
         }
         write!(f, "about {:.0} MiB", self.memory_mib)?;
         match self.time_s {
@@ -85,6 +91,7 @@ pub fn estimate(input: &Path, spacing_mm: Option<[f64; 3]>, recipe: &Recipe) -> 
         voxels: extent.map(|e| e.voxels),
         memory_mib: mib(BASE + (read.max(worked_on) * reading_bytes(recipe)).max(model_bytes)),
         time_s,
+        no_bone: false,
     }
 }
 
@@ -124,16 +131,21 @@ pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Re
         .voxels
         .map_or(voxels, |n| n.iter().map(|v| *v as f64).product());
     let mut bytes = reading * reading_bytes(recipe);
+    let mut no_bone = true;
     for case in cases(&recipe.lattice, params) {
-        bytes = bytes.max(voxels + need::of(specimen, case.as_ref(), params)?);
+        let needed = need::of(specimen, case.as_ref(), params)?;
+        bytes = bytes.max(voxels + needed);
+        no_bone &= needed == 0.0;
     }
     let time_s = match params.method {
-        Method::Lattice => first.time_s,
+        _ if no_bone => Some(0.0),
+        Method::Lattice => lattice(Some(specimen.bone.grid.size_mm()), recipe).1,
         Method::VoxelFe => Some(elements(specimen, params) * S_PER_ELEMENT),
     };
     Ok(Estimate {
         memory_mib: mib(BASE + bytes),
         time_s,
+        no_bone,
         ..*first
     })
 }

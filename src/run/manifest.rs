@@ -1,4 +1,5 @@
-//! Owns manifests: a CSV with one line per scan, its path and what is special about it.
+//! Owns manifests: a CSV with one line per scan, its path and what is special about it. Cells are divided by commas, or, as
+//! spreadsheets and R's `write.csv2` have it where the comma is the decimal mark, by semicolons or tabs.
 
 use crate::error::{Error, Result};
 use crate::io::scan;
@@ -31,10 +32,12 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
             ),
         )
     };
+    let text = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let delimiter = delimiter(&text);
     let mut reader = csv::ReaderBuilder::new()
+        .delimiter(delimiter)
         .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|e| wrong(format!("cannot be read: {e}")))?;
+        .from_reader(&text[..]);
     let header = reader
         .headers()
         .map_err(|e| wrong(format!("cannot be read: {e}")))?
@@ -50,8 +53,9 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
                 .get(at)
                 .filter(|cell| !cell.is_empty() && *cell != "NA")
         };
-        let job =
-            job(cell, folder, params).map_err(|found| wrong(format!("line {}: {found}", n + 2)))?;
+        let decimal_comma = delimiter != b',';
+        let job = job(cell, decimal_comma, folder, params)
+            .map_err(|found| wrong(format!("line {}: {found}", n + 2)))?;
         job.segment.check()?;
         jobs.push(job);
     }
@@ -59,6 +63,16 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
         return Err(wrong("lists no scans".to_owned()));
     }
     Ok(jobs)
+}
+
+/// What divides the cells of the header.
+fn delimiter(text: &[u8]) -> u8 {
+    let header = text.split(|b| *b == b'\n').next().unwrap_or_default();
+    let other = [b';', b'\t'].into_iter().find(|d| header.contains(d));
+    match other {
+        Some(other) if !header.contains(&b',') => other,
+        _ => b',',
+    }
 }
 
 fn check_header(header: &csv::StringRecord) -> std::result::Result<(), String> {
@@ -81,16 +95,22 @@ fn check_header(header: &csv::StringRecord) -> std::result::Result<(), String> {
 
 fn job<'a>(
     cell: impl Fn(&str) -> Option<&'a str>,
+    decimal_comma: bool,
     folder: &Path,
     params: &SegmentParams,
 ) -> std::result::Result<ScanJob, String> {
-    let number = |column: &str| match cell(column).map(str::parse::<f64>) {
-        None => Ok(None),
-        Some(Ok(v)) if v.is_finite() => Ok(Some(v)),
-        _ => Err(format!(
-            "expected a number in `{column}`, found `{}`",
-            cell(column).unwrap_or_default()
-        )),
+    let number = |column: &str| {
+        let Some(word) = cell(column) else {
+            return Ok(None);
+        };
+        let parsed = match decimal_comma {
+            true => word.replace(',', ".").parse::<f64>(),
+            false => word.parse(),
+        };
+        match parsed {
+            Ok(v) if v.is_finite() => Ok(Some(v)),
+            _ => Err(format!("expected a number in `{column}`, found `{word}`")),
+        }
     };
     let input = folder.join(cell("path").ok_or("no path")?);
     let mut segment = params.clone();
@@ -160,6 +180,27 @@ mod tests {
             (jobs[0].segment.spacing_mm, jobs[1].segment.spacing_mm),
             (Some([0.02; 3]), None)
         );
+    }
+
+    #[test]
+    fn spreadsheets_of_other_countries_are_understood() {
+        let text = "path;spacing_mm;lower\r\na.nii;0,0195;200,5\r\nb.nii;0.02;\r\n";
+        // Some spreadsheets mark their files as UTF-8.
+        for text in [
+            text.to_owned(),
+            text.replace(';', "\t"),
+            format!("\u{feff}{text}"),
+        ] {
+            let jobs = read_text(&text).unwrap();
+            let spacings = jobs.iter().map(|job| job.segment.spacing_mm);
+            assert!(
+                spacings.eq([Some([0.0195; 3]), Some([0.02; 3])]),
+                "{jobs:?}"
+            );
+            assert_eq!(jobs[0].segment.lower, Some(200.5));
+        }
+        let words = read_text("path;lower\na.nii;1.200,5\n").unwrap_err();
+        assert!(words.to_string().contains("found `1.200,5`"), "{words}");
     }
 
     #[test]

@@ -111,6 +111,7 @@ pub fn write(
         ));
         return Ok(paths);
     }
+    atomic::sweep(out);
     for ((_, bytes), path) in files.iter().zip(&paths) {
         atomic::write(path, bytes)?;
     }

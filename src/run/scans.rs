@@ -28,8 +28,6 @@ pub struct Selection {
     pub recursive: bool,
     /// Only scans whose file or folder name matches (`*` and `?`).
     pub pattern: Option<Pattern>,
-    /// Only the scan of this name: one job of many on a cluster.
-    pub only: Option<String>,
 }
 
 /// The scans under `inputs`, each with the recipe's settings or its manifest's.
@@ -59,17 +57,22 @@ pub fn find(
     }
     refuse_names(&jobs)?;
     refuse_doubles(&jobs)?;
-    if let Some(only) = &selection.only {
-        jobs.retain(|job| job.name == *only);
-        if jobs.is_empty() {
-            return Err(Error::setting(
-                "--only",
-                format!("no scan is named {only}"),
-                "list the names with --dry-run",
-            ));
-        }
-    }
     Ok(jobs)
+}
+
+/// The one scan of a name: one job of many on a cluster.
+///
+/// # Errors
+/// No scan of this name.
+pub fn only(jobs: &[ScanJob], name: &str) -> Result<Vec<ScanJob>> {
+    match jobs.iter().find(|job| job.name == name) {
+        Some(job) => Ok(vec![job.clone()]),
+        None => Err(Error::setting(
+            "--only",
+            format!("no scan is named {name}"),
+            "list the names with --dry-run",
+        )),
+    }
 }
 
 fn is_manifest(path: &Path) -> bool {
@@ -250,7 +253,6 @@ mod tests {
         let gz = Selection {
             recursive: true,
             pattern: Some(Pattern::new("*.gz").unwrap()),
-            only: None,
         };
         assert_eq!(find_names(&[root], &gz).unwrap(), ["s2"]);
     }

@@ -19,6 +19,9 @@ pub fn segment(
     params: &SegmentParams,
     session: &Session,
 ) -> Result<SegmentRecord> {
+    if !session.dry_run {
+        atomic::sweep(dir);
+    }
     let blake3 = scan::hash(input)?;
     let voi_blake3 = match &params.voi {
         Voi::Mask(path) => Some(scan::hash(path)?),
@@ -190,5 +193,5 @@ fn say(record: &SegmentRecord, session: &Session) {
     }
     r.warnings
         .iter()
-        .for_each(|w| session.warn(format!("{}: {w}", record.scan)));
+        .for_each(|w| session.warn_of(Some(&record.scan), w));
 }

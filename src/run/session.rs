@@ -65,10 +65,12 @@ impl Session {
 
     /// A warning on stderr. Shown even when quiet: it changes how a result is read.
     pub fn warn(&self, line: impl AsRef<str>) {
-        let scan = self
-            .scan
-            .as_ref()
-            .map_or(String::new(), |s| format!("{s}: "));
+        self.warn_of(self.scan.as_deref(), line);
+    }
+
+    /// A warning about `scan`.
+    pub fn warn_of(&self, scan: Option<&str>, line: impl AsRef<str>) {
+        let scan = scan.map_or(String::new(), |s| format!("{s}: "));
         self.note(&format!("warning: {}", line.as_ref()));
         self.output
             .bars

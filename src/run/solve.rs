@@ -1,7 +1,7 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
 use crate::error::Result;
-use crate::io::{inp, nifti, specimen, vti};
+use crate::io::{atomic, inp, nifti, specimen, vti, vtk};
 use crate::measure::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapolated};
 use crate::measure::ffb::with_ffb;
 use crate::measure::morphometry::Morphometry;
@@ -14,7 +14,7 @@ use crate::run::segment::load;
 use crate::run::session::Session;
 use crate::run::{estimate, stiffness};
 use crate::solve::cg::CgStep;
-use crate::stage::lattice::{Case, LatticeParams};
+use crate::stage::lattice::{Boundary, Case, LatticeParams};
 use crate::stage::solve::fields::Recorded;
 use crate::stage::solve::tissue::Tissue;
 use crate::stage::solve::{Load, Method, SolveParams, lattice, voxel_fe};
@@ -36,6 +36,9 @@ pub fn solve(
 ) -> Result<Vec<Row>> {
     lattices.check()?;
     params.check()?;
+    if !session.dry_run {
+        atomic::sweep(dir);
+    }
     let specimen = loaded(dir, params)?;
     let tissue = Tissue::of(&specimen, params)?;
     let settings = tissue.label(params.row(&specimen), params);
@@ -111,8 +114,11 @@ pub fn export_inp(dir: &Path, params: &SolveParams, bins: usize, session: &Sessi
     Ok(())
 }
 
-/// Struts thinner than two lattice parameters are one or two sites thick.
+/// Struts thinner than two lattice parameters are one or two sites thick, which graded lattices make up for.
 fn warn_of_coarse(dir: &Path, lattice: &LatticeParams, session: &Session) {
+    if lattice.boundary.iter().all(|b| *b == Boundary::Graded) {
+        return;
+    }
     let thickness = specimen::record(dir).and_then(|record| record.results.mean_thickness_mm);
     let Some(thickness) = thickness else { return };
     let coarse = lattice.lp_mm.iter().filter(|lp| **lp > 0.5 * thickness);
@@ -196,10 +202,14 @@ fn solve_job(
     }
     let observe = |step| show(&bar, step, params.tolerance);
     let (solved, recorded) = match job {
-        Job::Lattice(case) => (
-            lattice::solve_lattice(specimen, case, params, observe)?,
-            Recorded::default(),
-        ),
+        Job::Lattice(case) => {
+            let (solved, fields) = lattice::solve_recorded(specimen, case, params, observe)?;
+            if let Some(fields) = fields {
+                let name = case.stem();
+                vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), &name, &fields)?;
+            }
+            (solved, Recorded::default())
+        }
         Job::VoxelFe => voxel_fe::solve_recorded(specimen, params, observe)?,
     };
     bar.finish_and_clear();
@@ -256,8 +266,11 @@ pub(super) fn in_words(row: &Row) -> String {
     let discretization = row
         .discretization_error_mpa
         .map_or(String::new(), |e| format!(" ± {e:.3} (discretisation)"));
+    let failure = row
+        .failure_load_n
+        .map_or(String::new(), |load| format!("  failure load {load:.3} N"));
     format!(
-        "{} {:<8} {:<12} {:>6} mm  E_app {:>9} MPa ± {:<7}{discretization} {:>9} sites {:>6} iterations {:>7} s{note}",
+        "{} {:<8} {:<12} {:>6} mm  E_app {:>9} MPa ± {:<7}{discretization} {:>9} sites {:>6} iterations {:>7} s{failure}{note}",
         row.scan,
         row.structure,
         row.boundary.as_deref().unwrap_or(""),

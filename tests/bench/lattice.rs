@@ -118,7 +118,7 @@ fn pipeline(c: &mut Criterion) {
         b.iter(|| {
             let out = tempfile::tempdir().expect("room for results");
             let all = Selection::default();
-            cohort(&recipe, &scan, out.path(), &all, &resources, &session)
+            cohort(&recipe, &scan, out.path(), &all, None, &resources, &session)
                 .map(|_| ())
                 .expect("results")
         })

@@ -55,6 +55,7 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
         return Ok((Outcome::Done, None));
     }
     atomic::create_dir(out)?;
+    atomic::sweep(out);
     let begun = Instant::now();
     let fingerprint = fingerprint(&scene, &inputs);
     let mut writer = Writer::new(out, &scene.output, folder, fingerprint, session);

@@ -6,10 +6,9 @@ use crate::measure::row::Row;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision, Operator};
-use crate::par::sum_chunks;
 use crate::physics::lattice::multigrid::Springs;
 use crate::physics::lattice::pieces::{GradedLattice, GradedSprings};
-use crate::physics::lattice::{self, Lattice, Virial};
+use crate::physics::lattice::{self, Lattice};
 use crate::physics::material::Solid;
 use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
@@ -18,6 +17,7 @@ use crate::stage::lattice::{Boundary, Case, build_of, build_pieces};
 use crate::stage::solve::fields::SiteFields;
 use crate::stage::solve::mechanisms::mechanisms;
 use crate::stage::solve::solved::{Moduli, Solved};
+use crate::stage::solve::stress::Stress;
 use crate::stage::solve::tissue::Tissue;
 use crate::stage::solve::{Ends, Load, SolveParams};
 use crate::topology::placement::Frame;
@@ -164,33 +164,6 @@ impl Laid<'_> {
     /// Distance of the innermost gripped planes in mm.
     fn gauge_mm(&self) -> f64 {
         f64::from(self.grips.high - self.grips.low) * self.frame.step_mm
-    }
-}
-
-/// The stress of a lattice times its volume, in N mm: a functional of the displacements.
-struct Stress<'a, M> {
-    model: &'a M,
-    /// Which sites count; all where there is none. Made once, as the stress is asked for in every iteration.
-    counts: Option<Vec<bool>>,
-}
-
-impl<M: Virial> Stress<'_, M> {
-    fn sum<S: Copy + Into<f64> + Sync>(&self, u: &[[S; 3]]) -> f64 {
-        let counts = |s: &usize| self.counts.as_ref().is_none_or(|counts| counts[*s]);
-        sum_chunks(u.len(), |sites| {
-            let sites = sites.filter(counts);
-            sites.map(|s| self.model.site_virial(u, s)).sum()
-        })
-    }
-}
-
-impl<M: Virial> Functional<3> for Stress<'_, M> {
-    fn of(&self, u: &[[f64; 3]]) -> f64 {
-        self.sum(u)
-    }
-
-    fn of_single(&self, u: &[[f32; 3]]) -> f64 {
-        self.sum(u)
     }
 }
 

@@ -7,6 +7,7 @@ pub mod mechanisms;
 pub mod need;
 pub mod solved;
 pub mod stiffness;
+mod stress;
 pub mod tissue;
 pub mod voxel_fe;
 

@@ -1,0 +1,32 @@
+//! Owns the stress of a lattice as a functional of its displacements, which a solve can be asked for instead of the energy.
+
+use crate::operator::Functional;
+use crate::par::sum_chunks;
+use crate::physics::lattice::Virial;
+
+/// The stress of a lattice times its volume, in N mm: a functional of the displacements.
+pub struct Stress<'a, M> {
+    pub model: &'a M,
+    /// Which sites count; all where there is none. Made once, as the stress is asked for in every iteration.
+    pub counts: Option<Vec<bool>>,
+}
+
+impl<M: Virial> Stress<'_, M> {
+    fn sum<S: Copy + Into<f64> + Sync>(&self, u: &[[S; 3]]) -> f64 {
+        let counts = |s: &usize| self.counts.as_ref().is_none_or(|counts| counts[*s]);
+        sum_chunks(u.len(), |sites| {
+            let sites = sites.filter(counts);
+            sites.map(|s| self.model.site_virial(u, s)).sum()
+        })
+    }
+}
+
+impl<M: Virial> Functional<3> for Stress<'_, M> {
+    fn of(&self, u: &[[f64; 3]]) -> f64 {
+        self.sum(u)
+    }
+
+    fn of_single(&self, u: &[[f32; 3]]) -> f64 {
+        self.sum(u)
+    }
+}

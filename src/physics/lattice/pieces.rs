@@ -22,6 +22,8 @@ struct Direction {
     shell: usize,
     /// `k / (2 |d|²)`: a whole bond pulls by `spring · d (d · Δu)`.
     spring: f64,
+    /// `d` and `spring · d`, for products in single precision.
+    single: [[f32; 3]; 2],
     /// `1 / (2 |d|)`: a bond stretches by `half · d · Δu`.
     half: f64,
 }
@@ -42,10 +44,12 @@ impl<'a> GradedLattice<'a> {
             let d = stencil.direction(b).map(f64::from);
             let squared: f64 = d.iter().map(|c| c * c).sum();
             let shell = usize::from(b / 2 >= stencil.first_shell_pairs);
+            let spring = 0.5 * moduli.k[shell] / squared;
             Direction {
                 d,
                 shell,
-                spring: 0.5 * moduli.k[shell] / squared,
+                spring,
+                single: [1.0, spring].map(|by| d.map(|c| (by * c) as f32)),
                 half: 0.5 / squared.sqrt(),
             }
         };
@@ -322,10 +326,10 @@ impl Coarsen for GradedSprings<'_> {
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
         for (site, y) in sites.zip(y) {
             let mut f = [0f32; 3];
-            for (end, d, spring) in self.springs(site) {
-                let d = d.map(|c| c as f32);
+            for (end, b, share) in self.0.pieces.bonds.of(site) {
+                let [d, pull] = &self.0.directions[b].single;
                 let along: f32 = (0..3).map(|c| d[c] * (x[site][c] - x[end][c])).sum();
-                (0..3).for_each(|c| f[c] += spring as f32 * along * d[c]);
+                (0..3).for_each(|c| f[c] += share * along * pull[c]);
             }
             *y = f;
         }

@@ -123,6 +123,45 @@ fn a_lattice_converges_to_springs_in_series_in_first_order() {
     assert!((1.6..2.6).contains(&(coarse / fine)), "{coarse} {fine}");
 }
 
+/// With its sides held, each layer of a lattice has its label's own confined modulus, in first order in the lattice parameter
+/// (the interface's plane of sites has the mean of both); also where one label has no volumetric term at all.
+#[test]
+fn every_label_has_its_own_poissons_ratio_on_lattices() {
+    let confined = |e: f64, nu: f64| e * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
+    let block = labelled([20, 20, 20], 0.02, |p| p[2] < 10);
+    for nu in [0.1, 0.25, 0.4] {
+        let held = |material| SolveParams {
+            load: Load::Confined,
+            ..params(material)
+        };
+        let (a, b) = (confined(1000.0, 0.3), confined(700.0, nu));
+        let series = 2.0 * a * b / (a + b) / a;
+        let error = |lp: f64| {
+            let mixed = lattice(&block, lp, &held(labels([1000.0, 0.3], [700.0, nu])));
+            mixed / lattice(&block, lp, &held(None)) / series - 1.0
+        };
+        let (coarse, fine) = (error(0.04), error(0.02));
+        println!("{nu}: {coarse:e} {fine:e}");
+        assert!(
+            fine.abs() < 0.02 && fine.abs() < 0.7 * coarse.abs(),
+            "{nu}: {coarse} {fine}"
+        );
+    }
+}
+
+/// Labels of one ratio, told apart or not: the same lattice.
+#[test]
+fn ratios_that_do_not_differ_change_nothing() {
+    let block = labelled([8, 8, 8], 0.02, |p| p[0] < 4);
+    let one = lattice(&block, 0.04, &params(labels([500.0, 0.3], [900.0, 0.3])));
+    let two = lattice(
+        &block,
+        0.04,
+        &params(labels([500.0, 0.3], [900.0, 0.3 + 1e-9])),
+    );
+    assert!((two / one - 1.0).abs() < 1e-7, "{one} {two}");
+}
+
 /// Side by side, the uniform lattice's field stores the mean modulus's energy: the least energy is no larger.
 #[test]
 fn a_lattice_of_two_tissues_side_by_side_is_nearly_their_mean() {
@@ -156,8 +195,8 @@ fn what_has_no_modulus_is_refused_in_words() {
         let lattice = solve_lattice(specimen, &case(0.04), settings, |_| ());
         lattice.unwrap_err().to_string()
     };
-    let two = refused(&block, &params(labels([500.0, 0.3], [900.0, 0.2])));
-    assert!(two.contains("one Poisson's ratio"), "{two}");
+    let unstable = refused(&block, &params(labels([500.0, 0.3], [900.0, -0.6])));
+    assert!(unstable.contains("is stable for"), "{unstable}");
     let missing = Law::Labels(vec![Label {
         value: 100,
         young_mpa: 1.0,

@@ -135,6 +135,15 @@ pub fn build_of(
     Ok(Sites::connect(frame, &weights, grips))
 }
 
+/// What each site of a lattice takes of `tissue`, a value per voxel, times its weight: as its springs are made by [`build_of`].
+pub fn values_of(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sites) -> Vec<f64> {
+    let (frame, bone) = (&sites.frame, &specimen.bone);
+    let mut weights = weigh(frame, bone, case.boundary);
+    stiffen(frame, bone, tissue, &mut weights);
+    let value = |at: &[i32; 3]| frame.candidate(*at).map_or(0.0, |c| f64::from(weights[c]));
+    sites.indices.iter().map(value).collect()
+}
+
 /// [`build`] for a graded SC lattice: a site for each connected piece of bone in a cell.
 ///
 /// # Errors

@@ -5,7 +5,7 @@
 //!
 //! `U = Σ_i w_i [ ½ Σ_s k_s Σ_{j∈s} dl_ij² + ½ T Σ_s (Σ_{j∈s} dl_ij)² ]`, `dl_ij = ½ n_ij · (u_j − u_i)`,
 //!
-//! with `w_i = 1`, or the bone fraction of the site's cell on graded lattices.
+//! with `w_i = 1`, or the bone fraction of the site's cell on graded lattices. Where tissue differs in ν, `w_i T` is each site's own.
 
 pub mod moduli;
 
@@ -13,15 +13,14 @@ mod kernel;
 pub mod multigrid;
 pub mod pieces;
 mod quad;
+mod scaled;
 
 use crate::operator::{MixedPrecision, Operator};
 use crate::par::{each_chunk, sum_chunks};
-use crate::simd::{Isa, isa};
 use crate::topology::sites::Sites;
-use kernel::Bonds;
 pub use moduli::{Moduli, check_solid};
-use quad::{Precision, Quad};
 use rayon::prelude::*;
+use scaled::Scaled;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard};
 
@@ -63,6 +62,16 @@ pub struct Lattice<'a> {
 
 impl<'a> Lattice<'a> {
     pub fn new(sites: &'a Sites, moduli: Moduli) -> Self {
+        Lattice::of(sites, moduli, None)
+    }
+
+    /// A lattice whose sites have volumetric moduli `w_i T` (N/mm) of their own, beside `w_i k_s`.
+    pub fn with_volumetric(sites: &'a Sites, moduli: Moduli, volumetric: Vec<f64>) -> Self {
+        assert!(volumetric.len() == sites.len());
+        Lattice::of(sites, moduli, Some(volumetric))
+    }
+
+    fn of(sites: &'a Sites, moduli: Moduli, own_volumetric: Option<Vec<f64>>) -> Self {
         let stencil = sites.frame.structure.stencil();
         let pair = |(p, d): (usize, &[i32; 3])| {
             let d = d.map(f64::from);
@@ -81,8 +90,13 @@ impl<'a> Lattice<'a> {
             pairs: pairs.iter().map(|p| p.scaled(graded)).collect(),
             weights: sites.weights.clone(),
             volumetric: moduli.t,
+            own_volumetric,
         };
-        let room = if moduli.t == 0.0 { 0 } else { sites.len() };
+        let room = if double.is_volumetric() {
+            sites.len()
+        } else {
+            0
+        };
         Lattice {
             sites,
             moduli,
@@ -95,6 +109,11 @@ impl<'a> Lattice<'a> {
 
     fn weight(&self, site: usize) -> f64 {
         self.sites.weights.as_ref().map_or(1.0, |w| w[site])
+    }
+
+    /// `w_i T`.
+    fn volumetric(&self, site: usize) -> f64 {
+        self.double.volumetric(site)
     }
 
     /// Every pair with both neighbours along it; a missing one is the site itself.
@@ -130,18 +149,18 @@ impl<'a> Lattice<'a> {
             }
         }
         let [a, b] = self.volumetric_sums(u, site);
-        self.weight(site) * 0.5 * (springs + self.moduli.t * (a * a + b * b))
+        0.5 * (self.weight(site) * springs + self.volumetric(site) * (a * a + b * b))
     }
 }
 
 impl Virial for Lattice<'_> {
     fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> f64 {
         let (axis, grips) = (self.sites.frame.axis.index(), self.sites.grips);
-        let theta = if self.moduli.t == 0.0 {
-            [0.0; 2]
-        } else {
-            self.volumetric_sums(u, site)
+        let theta = match self.double.is_volumetric() {
+            true => self.volumetric_sums(u, site),
+            false => [0.0; 2],
         };
+        let (w, t) = (self.weight(site), self.volumetric(site));
         let plane = self.sites.plane(site);
         let mut sum = 0.0;
         for (pair, plus, minus) in self.bonded(site) {
@@ -160,12 +179,10 @@ impl Virial for Lattice<'_> {
                 let dl = sign * pair.half * along(pair.d, u[end], u[site]);
                 let share = f64::from(inside) / pair.d[axis].abs();
                 let lever = pair.half * pair.d[axis] * pair.d[axis] * self.sites.frame.step_mm;
-                sum += share
-                    * lever
-                    * (self.moduli.k[pair.shell] * dl + self.moduli.t * theta[pair.shell]);
+                sum += share * lever * (w * self.moduli.k[pair.shell] * dl + t * theta[pair.shell]);
             }
         }
-        self.weight(site) * sum
+        sum
     }
 }
 
@@ -184,224 +201,6 @@ impl Pair {
             axial: d.iter().filter(|&&c| c != 0.0).count() == 1,
             lever: [self.half * d[0], self.half * d[1], self.half * d[2], 0.0],
         }
-    }
-}
-
-/// What the kernels need of a lattice, by precision.
-#[derive(Debug)]
-struct Scaled<S> {
-    pairs: Vec<kernel::Pair<S>>,
-    weights: Option<Vec<S>>,
-    /// `T`.
-    volumetric: S,
-}
-
-impl Scaled<f64> {
-    fn to_single(&self) -> Scaled<f32> {
-        let single = |v: [f64; 4]| v.map(|x| x as f32);
-        let pair = |p: &kernel::Pair<f64>| kernel::Pair {
-            shell: p.shell,
-            diagonals: p.diagonals.map(single),
-            axial: p.axial,
-            lever: single(p.lever),
-        };
-        let weights = self.weights.as_ref();
-        Scaled {
-            pairs: self.pairs.iter().map(pair).collect(),
-            weights: weights.map(|w| w.iter().map(|&w| w as f32).collect()),
-            volumetric: self.volumetric as f32,
-        }
-    }
-}
-
-/// The kernels on this processor.
-impl<S: Precision> Scaled<S> {
-    fn bonds<'a>(&'a self, sites: &'a Sites) -> Bonds<'a, S> {
-        Bonds {
-            pairs: &self.pairs,
-            neighbours: &sites.neighbours,
-        }
-    }
-
-    /// The springs' part of `K u` at `range`.
-    fn springs(&self, sites: &Sites, range: Range<usize>, u: &[[S; 3]], y: &mut [[S; 3]]) {
-        assert!(u.len() == sites.len() && y.len() == range.len());
-        let (bonds, weights) = (self.bonds(sites), self.weights.as_deref());
-        // SAFETY: `isa` vouches for the instruction set, `Sites` for neighbours below its length.
-        unsafe {
-            match isa() {
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => avx2::springs::<S::Fast>(bonds, weights, range, u, y),
-                _ => springs::<S::Plain>(bonds, weights, range, u, y),
-            }
-        }
-    }
-
-    /// The springs' part of `K u` and `w_i T θ_{s,i}` at `range`.
-    fn springs_and_pressures(
-        &self,
-        sites: &Sites,
-        range: Range<usize>,
-        u: &[[S; 3]],
-        y: &mut [[S; 3]],
-        t: &mut [[S; 2]],
-    ) {
-        assert!(u.len() == sites.len() && y.len() == range.len() && t.len() == range.len());
-        let (bonds, weights, own) = (self.bonds(sites), self.weights.as_deref(), range.clone());
-        // SAFETY: as `springs`.
-        unsafe {
-            match isa() {
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => {
-                    avx2::springs_and_sums::<S::Fast>(bonds, weights, own, u, y, t);
-                }
-                _ => springs_and_sums::<S::Plain>(bonds, weights, own, u, y, t),
-            }
-        }
-        for (site, t) in range.zip(t) {
-            let factor = match weights {
-                Some(weights) => weights[site] * self.volumetric,
-                None => self.volumetric,
-            };
-            *t = t.map(|sum| factor * sum);
-        }
-    }
-
-    /// Adds what the volumetric term pulls by, from every site's `w T θ`.
-    fn add_volumetric_forces(
-        &self,
-        sites: &Sites,
-        range: Range<usize>,
-        t: &[[S; 2]],
-        y: &mut [[S; 3]],
-    ) {
-        assert!(t.len() == sites.len() && y.len() == range.len());
-        let bonds = self.bonds(sites);
-        // SAFETY: as `springs`.
-        unsafe {
-            match isa() {
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => {
-                    avx2::volumetric_forces::<S::Fast>(bonds, range, t, y);
-                }
-                _ => kernel::volumetric_forces::<S::Plain>(bonds, range, t, y),
-            }
-        }
-    }
-
-    /// `y = K u`, part by part; `t` is room for every site's `w T θ`. Each part, with its first site, is given to
-    /// `finish`, whose values are added up in order.
-    fn apply(
-        &self,
-        sites: &Sites,
-        u: &[[S; 3]],
-        y: &mut [[S; 3]],
-        t: &mut [[S; 2]],
-        finish: impl Fn(usize, &mut [[S; 3]]) -> f64 + Sync,
-    ) -> f64 {
-        if !t.is_empty() {
-            let parts = t.par_chunks_mut(PORTION).zip(y.par_chunks_mut(PORTION));
-            parts.enumerate().for_each(|(c, (t, y))| {
-                self.springs_and_pressures(sites, range(c, t.len()), u, y, t);
-            });
-        }
-        let t = &*t;
-        let [sum] = each_chunk(y, PORTION, |first, y| {
-            let own = first..first + y.len();
-            match t.is_empty() {
-                true => self.springs(sites, own, u, y),
-                false => self.add_volumetric_forces(sites, own, t, y),
-            }
-            [finish(first, y)]
-        });
-        sum
-    }
-}
-
-/// Uniform or graded springs.
-///
-/// # Safety
-/// As [`kernel::springs`].
-#[inline(always)]
-unsafe fn springs<Q: Quad>(
-    bonds: Bonds<Q::S>,
-    weights: Option<&[Q::S]>,
-    sites: Range<usize>,
-    u: &[[Q::S; 3]],
-    y: &mut [[Q::S; 3]],
-) {
-    unsafe {
-        match weights {
-            None => kernel::springs::<Q>(bonds, sites, u, y),
-            Some(w) => kernel::graded_springs::<Q>(bonds, w, sites, u, y),
-        }
-    }
-}
-
-/// The same with volumetric sums.
-///
-/// # Safety
-/// As [`kernel::springs`].
-#[inline(always)]
-unsafe fn springs_and_sums<Q: Quad>(
-    bonds: Bonds<Q::S>,
-    weights: Option<&[Q::S]>,
-    sites: Range<usize>,
-    u: &[[Q::S; 3]],
-    y: &mut [[Q::S; 3]],
-    theta: &mut [[Q::S; 2]],
-) {
-    unsafe {
-        match weights {
-            None => kernel::springs_and_sums::<Q>(bonds, sites, u, y, theta),
-            Some(w) => {
-                kernel::graded_springs::<Q>(bonds, w, sites.clone(), u, y);
-                kernel::volumetric_sums::<Q>(bonds, sites, u, theta);
-            }
-        }
-    }
-}
-
-/// The kernels compiled for AVX2 with fused multiply-add.
-#[cfg(target_arch = "x86_64")]
-mod avx2 {
-    use super::kernel::{self, Bonds};
-    use super::quad::{Precision, Quad};
-    use std::ops::Range;
-
-    #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn springs<Q: Quad>(
-        bonds: Bonds<Q::S>,
-        weights: Option<&[Q::S]>,
-        sites: Range<usize>,
-        u: &[[Q::S; 3]],
-        y: &mut [[Q::S; 3]],
-    ) {
-        unsafe { super::springs::<Q>(bonds, weights, sites, u, y) }
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn springs_and_sums<Q: Quad>(
-        bonds: Bonds<Q::S>,
-        weights: Option<&[Q::S]>,
-        sites: Range<usize>,
-        u: &[[Q::S; 3]],
-        y: &mut [[Q::S; 3]],
-        theta: &mut [[Q::S; 2]],
-    ) {
-        unsafe { super::springs_and_sums::<Q>(bonds, weights, sites, u, y, theta) }
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn volumetric_forces<Q: Quad>(
-        bonds: Bonds<Q::S>,
-        sites: Range<usize>,
-        t: &[[Q::S; 2]],
-        y: &mut [[Q::S; 3]],
-    ) where
-        Q::S: Precision,
-    {
-        unsafe { kernel::volumetric_forces::<Q>(bonds, sites, t, y) }
     }
 }
 
@@ -475,7 +274,7 @@ impl Lattice<'_> {
     }
 
     fn site_diagonal(&self, site: usize) -> [f64; 3] {
-        let (t, w) = (self.moduli.t, self.weight(site));
+        let w = self.weight(site);
         let (mut d, mut gradient) = ([0.0; 3], [[0.0; 3]; 2]);
         for (pair, plus, minus) in self.bonded(site) {
             for (end, sign) in [(plus, 1.0), (minus, -1.0)] {
@@ -483,15 +282,16 @@ impl Lattice<'_> {
                     continue;
                 }
                 let spring = 0.5 * (w + self.weight(end)) * pair.spring;
-                let volumetric = self.weight(end) * t * pair.half * pair.half;
+                let volumetric = self.volumetric(end) * pair.half * pair.half;
                 for c in 0..3 {
                     d[c] += (spring + volumetric) * pair.d[c] * pair.d[c];
                     gradient[pair.shell][c] += sign * pair.half * pair.d[c];
                 }
             }
         }
+        let t = self.volumetric(site);
         for c in 0..3 {
-            d[c] += w * t * (gradient[0][c].powi(2) + gradient[1][c].powi(2));
+            d[c] += t * (gradient[0][c].powi(2) + gradient[1][c].powi(2));
         }
         d
     }

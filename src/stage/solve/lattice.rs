@@ -9,11 +9,11 @@ use crate::operator::{Functional, MixedPrecision, Operator};
 use crate::physics::lattice::multigrid::Springs;
 use crate::physics::lattice::pieces::{GradedLattice, GradedSprings};
 use crate::physics::lattice::{self, Lattice};
-use crate::physics::material::Solid;
 use crate::solve::amg::{Amg, AmgParams};
 use crate::solve::cg::{CgInfo, CgParams, CgStep};
 use crate::solve::fallback::minimise_or_fall_back;
-use crate::stage::lattice::{Boundary, Case, build_of, build_pieces};
+use crate::stage::lattice::{Boundary, Case, build_of, build_pieces, values_of};
+use crate::stage::solve::blend::Blend;
 use crate::stage::solve::fields::SiteFields;
 use crate::stage::solve::mechanisms::mechanisms;
 use crate::stage::solve::solved::{Moduli, Solved};
@@ -54,9 +54,9 @@ pub fn solve_recorded(
         ));
     }
     let tissue = Tissue::of(specimen, params)?;
-    let (solid, mixed) = one_ratio(&tissue)?;
-    let moduli = lattice::Moduli::new(case.structure, case.lp_mm, solid.young_mpa, solid.poisson)?;
-    if case.in_pieces() && mixed.is_some() {
+    let blend = Blend::of(&tissue, case)?;
+    let moduli = blend.moduli;
+    if case.in_pieces() && blend.springs.is_some() {
         return Err(Error::setting(
             "solve.material",
             "graded SC lattices are of one tissue",
@@ -95,7 +95,8 @@ pub fn solve_recorded(
         let fields = SiteFields::of(&params.fields, laid.places(), &u, energy, fraction);
         return Ok((solved, fields));
     }
-    let sites = build_of(specimen, mixed, case, params.axis, params.grip_mm)?;
+    let springs = blend.springs.as_deref();
+    let sites = build_of(specimen, springs, case, params.axis, params.grip_mm)?;
     if sites.is_empty() {
         return Ok((Solved::disconnected(sites.dropped), None));
     }
@@ -105,7 +106,14 @@ pub fn solve_recorded(
         grips: sites.grips,
         dropped: sites.dropped,
     };
-    let model = Lattice::new(&sites, moduli);
+    let model = match &blend.volumetric {
+        None => Lattice::new(&sites, moduli),
+        Some(tissue) => {
+            let by_site = values_of(specimen, tissue, case, &sites);
+            let volumetric = by_site.into_iter().map(|v| v * moduli.t).collect();
+            Lattice::with_volumetric(&sites, moduli, volumetric)
+        }
+    };
     let springs = Springs::new(&model);
     let counts = (case.boundary == Boundary::Firm).then(|| {
         let all = (0..sites.len()).into_par_iter();
@@ -205,30 +213,6 @@ fn solve_model(
         mechanisms: None,
     };
     (solved, u)
-}
-
-/// The solid that a lattice is laid out for, and each voxel's modulus over it.
-///
-/// # Errors
-/// More than one Poisson's ratio: the ratio of a lattice's springs to its volumetric term is the same at every site.
-fn one_ratio(tissue: &Tissue) -> Result<(Solid, Option<&[f32]>)> {
-    match tissue {
-        Tissue::Uniform(solid) => Ok((*solid, None)),
-        Tissue::Mixed(mixed) => match mixed.poissons[..] {
-            [poisson] => {
-                let young_mpa = mixed.mean_mpa;
-                Ok((Solid { young_mpa, poisson }, Some(&mixed.factor)))
-            }
-            _ => Err(Error::setting(
-                "solve.material",
-                format!(
-                    "a lattice has one Poisson's ratio, the labels have {:?}",
-                    mixed.poissons
-                ),
-                "give all labels one ratio, or add --method voxel-fe",
-            )),
-        },
-    }
 }
 
 /// Which unknowns are held, and a start that meets them: the field of a homogeneous bar.

@@ -1,5 +1,6 @@
 //! Owns the solve stage: material, load, supports and accuracy in, apparent moduli out.
 
+mod blend;
 pub mod bricks;
 pub mod fields;
 pub mod lattice;

@@ -159,7 +159,7 @@ def maps(name, files):
 
 maps("heat-disc", ["heat-disc/temperature_t1.png"])
 maps("crack-tip", ["crack-tip-I/stress_yy_t1.png"])
-maps("plate", [f"notched-plate/damage_t{t}.png" for t in ("0.4", "0.8", "1.2")])
+maps("plate", [f"notched-plate/damage_t{t}.png" for t in ("0.4", "0.8", "1.3")])
 maps("inclusion", ["square-inclusion/damage_t0.02.png"])
 maps("plate-modes", [f"plate-modes/magnitude_t{t}.png" for t in (4, 5, 7, 8)])
 maps("tetrachiral", [f"tetrachiral-modes/magnitude_t{t}.png" for t in (4, 5, 7)])

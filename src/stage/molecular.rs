@@ -177,12 +177,15 @@ pub struct Vibration {
 pub struct Known {
     pub region: Region,
     pub field: KnownField,
+    /// Angle of the direction ahead of the crack, for `crack-tip`: the grid need not lie along the crack.
+    #[serde(default)]
+    pub angle_deg: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KnownField {
-    /// Displacement and rotation about a crack tip at the origin, the crack along negative x: K_I and K_II.
+    /// Displacement and rotation about a crack tip at the origin, the crack behind it along `angle_deg`: K_I and K_II.
     CrackTip([f64; 2]),
     /// The affine field of ε11, ε22, 2 ε12, without rotation.
     Strain([f64; 3]),

@@ -5,6 +5,7 @@
 //! instead of being halved until it is near. Work, elastic energy, the energy of broken bonds and the energy given up
 //! while the body moves to its new equilibrium at constant load are counted separately and must balance.
 
+mod kept;
 mod report;
 mod start;
 mod watch;
@@ -42,6 +43,10 @@ struct Front<'a, const D: usize> {
     crack: Crack,
     /// One flag per listed bond.
     broken: Vec<bool>,
+    /// Broken bonds in their order: a point and the bond's place in the list. Those from `before_window` on broke in
+    /// this window.
+    order: Vec<(usize, usize)>,
+    before_window: usize,
     conductor: Option<Body<1>>,
     window: Window<D>,
     bonds: Vec<WindowBond>,
@@ -50,6 +55,9 @@ struct Front<'a, const D: usize> {
     /// Largest energy ratio outside the window then, under unit load, and whether bonds have broken since.
     far: f64,
     stale: bool,
+    /// The load step under way, and the events in it since the last look at the whole body.
+    step: usize,
+    events: usize,
     lambda: f64,
     recorded: f64,
     ledger: Ledger,
@@ -98,13 +106,18 @@ pub fn run<const D: usize>(
     observer.start(&setup.points, (time.end / time.step).round() as usize)?;
     let mut front = Front::new(scene, model, params, solid, setup)?;
     let steps = (time.end / time.step).round().max(1.0) as usize;
-    front.record(observer, true, false)?;
-    for step in 1..=steps {
-        front.load_to(time.step * step as f64, observer)?;
-        front.record(observer, true, step == steps || front.crack.stopped)?;
-        if front.crack.stopped {
-            break;
+    match observer.resume()? {
+        Some(state) => {
+            front.restore(&state)?;
+            observer.say(&format!("goes on at a load of {:.6}", front.lambda));
         }
+        None => front.record(observer, true, false)?,
+    }
+    while front.step <= steps && !front.crack.stopped {
+        front.load_to(time.step * front.step as f64, observer)?;
+        let last = front.step == steps || front.crack.stopped;
+        front.record(observer, true, last)?;
+        (front.step, front.events) = (front.step + 1, 0);
     }
     Ok(front.summary(steps))
 }
@@ -112,8 +125,8 @@ pub fn run<const D: usize>(
 impl<const D: usize> Front<'_, D> {
     /// Raises the load to `target`, breaking bonds on the way.
     fn load_to(&mut self, target: f64, observer: &mut dyn Observer) -> Result<()> {
-        let mut events = 0;
         while !self.crack.stopped {
+            observer.keep(&|| self.state())?;
             let ratios: Vec<f64> = self
                 .bonds
                 .par_iter()
@@ -131,9 +144,9 @@ impl<const D: usize> Front<'_, D> {
             // Far from the front ratios change slowly: while the front is well ahead, looking now and then will do.
             let reaches = near.max(self.far) * target * target >= 1.0;
             let close = 2.0 * self.far > near || !reaches;
-            if self.stale && (events >= LOOK || (!running && close)) {
+            if self.stale && (self.events >= LOOK || (!running && close)) {
                 self.look();
-                events = 0;
+                self.events = 0;
             }
             let largest = near.max(self.far);
             if target * target * largest < 1.0 && !running {
@@ -148,7 +161,7 @@ impl<const D: usize> Front<'_, D> {
                 self.advance(near.sqrt().recip().max(self.lambda));
                 self.record(observer, false, false)?;
             }
-            events += 1;
+            self.events += 1;
             let limit = (1.0 - 1e-9) / (self.lambda * self.lambda);
             let limit = limit.max((1.0 - self.params.batch) * near);
             self.break_bonds(&ratios, limit)?;
@@ -177,15 +190,13 @@ impl<const D: usize> Front<'_, D> {
         let chosen: Vec<usize> = (0..ratios.len()).filter(|&k| ratios[k] >= limit).collect();
         for &k in &chosen {
             let bond = self.bonds[k];
-            let (p, q) = (self.window.point(bond.a), self.window.point(bond.b));
-            let factor = self.solid.body.factor(bond.slots[0]);
-            let b = &self.setup.bonds[bond.kinds[0] as usize];
-            let w = ratios[k] * self.critical[bond.kinds[0] as usize];
-            self.ledger.broken +=
-                square * factor * w * b.volume_mm2 * self.setup.cell * (1.0 - RESIDUAL);
-            lost.push((bond, factor * (1.0 - RESIDUAL)));
+            let kind = bond.kinds[0] as usize;
+            let w = ratios[k] * self.critical[kind];
             leaves |= !self.window.is_inner(&bond);
-            self.mark(bond.slots, p, q);
+            let (bond, factor) = self.lose(self.window.point(bond.a), bond.slots[0]);
+            let volume = self.setup.bonds[kind].volume_mm2 * self.setup.cell;
+            self.ledger.broken += square * factor * w * volume;
+            lost.push((bond, factor));
         }
         let mut keep = chosen.iter().peekable();
         let mut at = 0;
@@ -208,14 +219,19 @@ impl<const D: usize> Front<'_, D> {
         Ok(())
     }
 
-    /// Marks a bond as broken in the bodies and in the crack's measures.
-    fn mark(&mut self, slots: [usize; 2], p: usize, q: usize) {
-        debug_assert_eq!(opposite(self.setup, p, q).0, slots[1]);
+    /// Marks the bond listed at `slot` of point `p` as broken in the bodies and in the crack's measures; the factor it
+    /// loses.
+    fn mark(&mut self, p: usize, slot: usize) -> f64 {
+        let (q, _) = self.setup.family.kind(slot);
+        let slots = [slot, opposite(self.setup, p, q).0];
+        let lost = self.solid.body.factor(slot) * (1.0 - RESIDUAL);
         slots.iter().for_each(|&s| self.broken[s] = true);
         self.solid.body.scale(slots, RESIDUAL);
         if let Some(conductor) = &mut self.conductor {
             conductor.scale(slots, RESIDUAL);
         }
         self.crack.grow(&self.setup.points, [p, q]);
+        self.order.push((p, slot));
+        lost
     }
 }

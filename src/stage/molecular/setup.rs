@@ -129,7 +129,7 @@ impl Setup {
         model: &Molecular,
         names: [&[&str]; D],
         t: f64,
-        tip: Option<&CrackTip>,
+        tensor: Option<&PlaneTensor>,
     ) -> Result<Vec<Option<f64>>> {
         let mut held = vec![None; self.points.len() * D];
         for hold in &scene.hold {
@@ -157,12 +157,14 @@ impl Setup {
             }
         }
         for known in &model.known {
+            let turn = known.angle_deg.to_radians();
+            let tip = tensor.map(|t| CrackTip::new(&t.turned(-turn)));
             for p in known
                 .region
                 .select(&self.points, self.points.len(), "known.region")?
             {
                 let x = self.points.position(p);
-                let values = known_values::<D>(&known.field, x, tip);
+                let values = known_values::<D>(&known.field, x, turn, tip.as_ref());
                 for (d, value) in values.into_iter().enumerate() {
                     if let Some(value) = value {
                         held[p * D + d] = Some(value);
@@ -174,10 +176,11 @@ impl Setup {
     }
 }
 
-/// What a known field prescribes at `x`, by component.
+/// What a known field prescribes at `x`, by component; a crack tip's lies along `turn` (radians).
 fn known_values<const D: usize>(
     field: &KnownField,
     x: [f64; 2],
+    turn: f64,
     tip: Option<&CrackTip>,
 ) -> [Option<f64>; D] {
     let mut values = [None; D];
@@ -189,8 +192,10 @@ fn known_values<const D: usize>(
     };
     match (field, tip) {
         (KnownField::CrackTip(k), Some(tip)) if D > 1 => {
-            let [u, v] = tip.displacement(x, *k);
-            put(&[u, v, tip.rotation(x, *k)]);
+            let (s, c) = turn.sin_cos();
+            let ahead = [c * x[0] + s * x[1], c * x[1] - s * x[0]];
+            let [u, v] = tip.displacement(ahead, *k);
+            put(&[c * u - s * v, s * u + c * v, tip.rotation(ahead, *k)]);
         }
         (KnownField::Strain([e11, e22, shear]), _) if D > 1 => {
             put(&[
@@ -269,8 +274,7 @@ impl<const D: usize> Solid<D> {
         let body = setup.finish(model, Body::new(setup.family.clone(), blocks));
         let names: [&[&str]; D] = std::array::from_fn(|d| DISPLACEMENT[d]);
         let t = scene.time.as_ref().map_or(1.0, |time| time.end);
-        let tip = CrackTip::new(tensor);
-        let held = setup.held(scene, model, names, t, Some(&tip))?;
+        let held = setup.held(scene, model, names, t, Some(tensor))?;
         Ok(Solid { body, moduli, held })
     }
 }

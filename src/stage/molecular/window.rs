@@ -1,24 +1,20 @@
 //! Owns the moving window about a crack front: the rest of the body is condensed onto its points, so that bonds broken
 //! inside it cost a dense solve of the window alone.
 
+mod kept;
+mod lost;
+
+pub use lost::{WindowBond, opposite};
+
 use super::equilibrium::{Factorised, factorise, right_hand_side};
 use super::setup::Setup;
 use crate::error::Result;
 use crate::physics::anisotropic::body::Body;
 use crate::physics::anisotropic::bond::Blocks;
 use crate::solve::zone::Zone;
+use lost::{add_forces, entries};
 
 const OUTSIDE: u32 = u32::MAX;
-
-/// A bond between points `a` and `b` of the window (window numbers), and its places in the family's list.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WindowBond {
-    pub a: u32,
-    pub b: u32,
-    /// Kinds in the stencil seen from `a` and from `b`.
-    pub kinds: [u16; 2],
-    pub slots: [usize; 2],
-}
 
 /// What breaking bonds came to, per unit of load squared and thickness.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +42,8 @@ pub struct Window<const D: usize> {
     /// Bonds broken (with their factor) since the factorisation; those from `fresh` on since the last absorption.
     broken: Vec<(WindowBond, f64)>,
     fresh: usize,
+    /// How many bonds were broken at each absorption.
+    absorbed: Vec<usize>,
     /// x·A x at factorisation.
     stored: f64,
 }
@@ -90,6 +88,7 @@ impl<const D: usize> Window<D> {
             first,
             broken: Vec::new(),
             fresh: 0,
+            absorbed: Vec::new(),
             stored: 2.0 * body.energy(&x),
             factorised,
         };
@@ -117,21 +116,27 @@ impl<const D: usize> Window<D> {
     /// Bonds of the window for which `keep(slot)` holds, each once.
     pub fn bonds(&self, setup: &Setup, keep: impl Fn(usize) -> bool) -> Vec<WindowBond> {
         let mut all = Vec::new();
-        for (a, &p) in self.points.iter().enumerate() {
+        for &p in &self.points {
             for slot in setup.family.range(p as usize) {
-                let (q, kind) = setup.family.kind(slot);
+                let (q, _) = setup.family.kind(slot);
                 if q > p as usize && self.holds(q) && keep(slot) {
-                    let (back, opposite) = opposite(setup, p as usize, q);
-                    all.push(WindowBond {
-                        a: a as u32,
-                        b: self.local[q],
-                        kinds: [kind as u16, opposite as u16],
-                        slots: [slot, back],
-                    });
+                    all.push(self.bond(setup, p as usize, slot));
                 }
             }
         }
         all
+    }
+
+    /// The bond listed at `slot` of point `p`, both ends of which are in the window.
+    pub fn bond(&self, setup: &Setup, p: usize, slot: usize) -> WindowBond {
+        let (q, kind) = setup.family.kind(slot);
+        let (back, opposite) = opposite(setup, p, q);
+        WindowBond {
+            a: self.local[p],
+            b: self.local[q],
+            kinds: [kind as u16, opposite as u16],
+            slots: [slot, back],
+        }
     }
 
     /// Values at a window point under unit load.
@@ -177,8 +182,7 @@ impl<const D: usize> Window<D> {
         add_forces(fresh, blocks, &moved, &mut given);
         force.iter_mut().zip(&given).for_each(|(f, g)| *f -= g);
         let relaxed = moved.iter().zip(&force).map(|(m, f)| 0.5 * m * f).sum();
-        if info.iterations > RENEW && self.zone.absorb(entries(fresh, blocks)) {
-            self.fresh = self.broken.len();
+        if info.iterations > RENEW && self.absorb(blocks, self.broken.len()) {
             self.base
                 .iter_mut()
                 .zip(&self.since)
@@ -189,6 +193,17 @@ impl<const D: usize> Window<D> {
             iterations: info.iterations,
             relaxed,
         }
+    }
+
+    /// Renews the dense factor without the first `count` broken bonds. False if there is none.
+    fn absorb(&mut self, blocks: &[Blocks<D>], count: usize) -> bool {
+        let fresh = &self.broken[self.fresh..count];
+        let done = self.zone.absorb(entries(fresh, blocks));
+        if done {
+            self.fresh = count;
+            self.absorbed.push(count);
+        }
+        done
     }
 
     /// The solution under unit load everywhere.
@@ -209,57 +224,4 @@ impl<const D: usize> Window<D> {
         self.factorised.llt.solve(&mut q);
         self.factorised.expand(&q, held)
     }
-}
-
-/// Slot and kind of the bond from `q` back to `p`.
-pub fn opposite(setup: &Setup, p: usize, q: usize) -> (usize, usize) {
-    let back = setup.family.range(q).find(|&s| setup.family.kind(s).0 == p);
-    let back = back.expect("bonds are listed at both ends");
-    (back, setup.family.kind(back).1)
-}
-
-/// Adds the forces the broken bonds no longer carry.
-fn add_forces<const D: usize>(
-    bonds: &[(WindowBond, f64)],
-    blocks: &[Blocks<D>],
-    x: &[f64],
-    y: &mut [f64],
-) {
-    let at = |p: u32| -> [f64; D] { std::array::from_fn(|d| x[p as usize * D + d]) };
-    for (bond, lost) in bonds {
-        let (a, b) = (at(bond.a), at(bond.b));
-        let forces = [
-            (bond.a, blocks[bond.kinds[0] as usize].apply(&a, &b)),
-            (bond.b, blocks[bond.kinds[1] as usize].apply(&b, &a)),
-        ];
-        for (p, force) in forces {
-            for (d, f) in force.into_iter().enumerate() {
-                y[p as usize * D + d] += lost * f;
-            }
-        }
-    }
-}
-
-/// The same as matrix entries.
-fn entries<const D: usize>(
-    bonds: &[(WindowBond, f64)],
-    blocks: &[Blocks<D>],
-) -> impl Iterator<Item = (usize, usize, f64)> {
-    bonds.iter().flat_map(move |(bond, lost)| {
-        let ends = [
-            (bond.a, bond.b, bond.kinds[0]),
-            (bond.b, bond.a, bond.kinds[1]),
-        ];
-        ends.into_iter().flat_map(move |(here, there, kind)| {
-            let block = blocks[kind as usize];
-            (0..D * D).flat_map(move |k| {
-                let (i, j) = (k / D, k % D);
-                let row = here as usize * D + i;
-                [
-                    (row, here as usize * D + j, lost * block.own[i][j]),
-                    (row, there as usize * D + j, lost * block.cross[i][j]),
-                ]
-            })
-        })
-    })
 }

@@ -86,6 +86,8 @@ impl<'a, const D: usize> Front<'a, D> {
         let mut front = Front {
             critical: setup.bonds.iter().map(|b| law.at(b.psi())).collect(),
             broken: vec![false; setup.family.len()],
+            order: Vec::new(),
+            before_window: 0,
             scene,
             model,
             params,
@@ -99,6 +101,8 @@ impl<'a, const D: usize> Front<'a, D> {
             x,
             far: 0.0,
             stale: false,
+            step: 1,
+            events: 0,
             lambda: 0.0,
             recorded: 0.0,
             ledger: Ledger::default(),

@@ -56,8 +56,16 @@ impl<const D: usize> Front<'_, D> {
             .filter(|&p| worst[p] >= 0.6 * largest && worst[p] > 0.0)
             .collect();
         seeds.sort_by(|&a, &b| worst[b].total_cmp(&worst[a]).then(a.cmp(&b)));
-        let chosen = self.around(&seeds);
-        let (window, x) = Window::new(&self.solid.body, self.setup, &self.solid.held, &chosen)?;
+        self.put_window(&self.around(&seeds))?;
+        self.windows += 1;
+        self.look();
+        Ok(())
+    }
+
+    /// Factorises the body as it is, with a window on the `chosen` points.
+    pub fn put_window(&mut self, chosen: &[usize]) -> Result<()> {
+        let (window, x) = Window::new(&self.solid.body, self.setup, &self.solid.held, chosen)?;
+        self.before_window = self.order.len();
         self.window = window;
         self.x = x;
         let may = |slot: usize, p: usize, q: usize| {
@@ -66,35 +74,43 @@ impl<const D: usize> Front<'_, D> {
         let mut bonds = self.window.bonds(self.setup, |slot| !self.broken[slot]);
         bonds.retain(|b| may(b.slots[0], self.window.point(b.a), self.window.point(b.b)));
         self.bonds = bonds;
-        self.windows += 1;
-        self.look();
         Ok(())
     }
 
-    /// Free points within reach of the seeds, the first seeds first, up to the window's size.
+    /// Free points within reach of the seeds: first about those that no earlier one covers, so that two tips of a crack
+    /// share a window, then about the others up to the window's size, the first seeds first.
     pub fn around(&self, seeds: &[usize]) -> Vec<usize> {
-        let setup = self.setup;
-        let mut taken = vec![false; setup.points.len()];
+        let mut taken = vec![false; self.setup.points.len()];
         let mut chosen = Vec::new();
-        let reach = REACH.ceil() as i32;
-        for &seed in seeds {
-            if chosen.len() >= self.params.window_points {
-                break;
-            }
-            let [i, j] = setup.points.cell(seed);
-            for dj in -reach..=reach {
-                for di in -reach..=reach {
-                    let near = f64::from(di * di + dj * dj) <= REACH * REACH;
-                    let Some(p) = setup.points.at([i + di, j + dj]).filter(|_| near) else {
-                        continue;
-                    };
-                    if !taken[p] && (0..D).all(|d| self.solid.held[p * D + d].is_none()) {
-                        taken[p] = true;
-                        chosen.push(p);
-                    }
+        for filling in [false, true] {
+            for &seed in seeds {
+                if chosen.len() >= self.params.window_points {
+                    return chosen;
+                }
+                if filling || !taken[seed] {
+                    self.cover(seed, &mut taken, &mut chosen);
                 }
             }
         }
         chosen
+    }
+
+    /// Takes the free points within reach of `seed`.
+    fn cover(&self, seed: usize, taken: &mut [bool], chosen: &mut Vec<usize>) {
+        let points = &self.setup.points;
+        let [i, j] = points.cell(seed);
+        let reach = REACH.ceil() as i32;
+        for dj in -reach..=reach {
+            for di in -reach..=reach {
+                let near = f64::from(di * di + dj * dj) <= REACH * REACH;
+                let Some(p) = points.at([i + di, j + dj]).filter(|_| near) else {
+                    continue;
+                };
+                if !taken[p] && (0..D).all(|d| self.solid.held[p * D + d].is_none()) {
+                    taken[p] = true;
+                    chosen.push(p);
+                }
+            }
+        }
     }
 }

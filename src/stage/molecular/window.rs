@@ -31,7 +31,7 @@ pub struct Window<const D: usize> {
     /// Points of the window, in order of elimination.
     points: Vec<u32>,
     local: Vec<u32>,
-    /// Whether all neighbours of a window point are in the window.
+    /// Whether all neighbours of a window point that could be in the window are.
     inner: Vec<bool>,
     /// Right-hand side of the unknowns under unit load.
     load: Vec<f64>,
@@ -75,7 +75,10 @@ impl<const D: usize> Window<D> {
             .iter()
             .enumerate()
             .for_each(|(k, &p)| local[p] = k as u32);
-        let whole = |&p: &usize| setup.family.of(p).all(|(q, _)| local[q] != OUTSIDE);
+        // Beside held points a crack cannot leave the window: their bonds never break.
+        let held_at = |q: usize| (0..D).any(|d| held[q * D + d].is_some());
+        let inside = |q: usize| local[q] != OUTSIDE || held_at(q);
+        let whole = |&p: &usize| setup.family.of(p).all(|(q, _)| inside(q));
         let first: Vec<f64> = chosen.iter().flat_map(|&p| x[p]).collect();
         let window = Window {
             zone,
@@ -103,7 +106,7 @@ impl<const D: usize> Window<D> {
         self.load.len()
     }
 
-    /// Whether both ends of a bond have their whole family in the window.
+    /// Whether both ends of a bond have all of their family in the window that could be there.
     pub fn is_inner(&self, bond: &WindowBond) -> bool {
         self.inner[bond.a as usize] && self.inner[bond.b as usize]
     }

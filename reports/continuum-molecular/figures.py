@@ -122,9 +122,15 @@ def kinking():
         "silicon": [0, -18.9, -33.1, -42.6, -49.3, -54.4, -58.6, -62.2, -65.6, -68.9],
         "anisotropic": [0, -19.7, -33.8, -43.8, -51.1, -56.8, -61.4, -65.5, -69.2, -72.7],
     }
+    # Largest energy release rate, by kinks.py.
+    energy = {
+        "silicon": criterion["silicon"],
+        "anisotropic": [9.5, -10.5, -28.3, -41.2, -50.2, -56.9, -62.0, -66.1, -69.5, -72.5],
+    }
     figure, axes = plt.subplots(1, 2, figsize=(7.4, 3.2), sharey=True)
     for axis, (material, angles) in zip(axes, criterion.items()):
         axis.plot(range(0, 91, 10), [-a for a in angles], color=HUES[2], lw=1, label="maximum hoop stress")
+        axis.plot(range(0, 91, 10), [-a for a in energy[material]], "--", color=HUES[3], lw=1, label="maximum energy release")
         for k, (grid, folder) in enumerate((("a/60", ""), ("a/40", "-40"))):
             path = RUNS / f"crack-kinking-{material}{folder}" / "scene.json"
             if not path.exists():

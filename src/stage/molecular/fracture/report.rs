@@ -76,10 +76,6 @@ impl<const D: usize> Front<'_, D> {
             self.look();
             fields.insert(0, scalar("damage", self.damage()));
             fields.push(displacement(&self.x, self.lambda));
-            fields.push(scalar(
-                "displacement_y",
-                self.x.iter().map(|u| self.lambda * u[1]).collect(),
-            ));
         }
         if accepted {
             self.recorded = self.lambda;

@@ -87,12 +87,15 @@ fn benches(c: &mut Criterion, name: &str, bone: &Specimen) {
         b.iter(|| amg.apply_single(black_box(&x32), &mut y32, &mut spare))
     });
     drop(amg);
-    group.bench_function("solve to 0.1 %", |b| {
-        b.iter(|| {
-            let params = SolveParams::default();
-            solve_lattice(bone, &case(), &params, |_| ()).map(|s| s.iterations)
-        })
-    });
+    // Thin waves are one site thick, mechanisms that take a thousand iterations: minutes of a bench.
+    if name != "thin" {
+        group.bench_function("solve to 0.1 %", |b| {
+            b.iter(|| {
+                let params = SolveParams::default();
+                solve_lattice(bone, &case(), &params, |_| ()).map(|s| s.iterations)
+            })
+        });
+    }
     group.finish();
 }
 

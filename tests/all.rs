@@ -20,6 +20,7 @@ mod phantom;
 mod pipelines;
 mod place;
 mod remodelling;
+mod report;
 mod scenes;
 mod segment;
 mod stability;

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-fn text(path: &Path) -> &str {
+pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
@@ -34,7 +34,7 @@ const RECIPE: &str =
     "[segment]\nlower = 500.0\n[lattice]\nlp_mm = [0.15, 0.2]\n[solve]\ntolerance = 1e-6\n";
 
 /// A folder with a recipe and `n` scans.
-fn cohort(n: usize) -> (tempfile::TempDir, PathBuf, PathBuf) {
+pub fn cohort(n: usize) -> (tempfile::TempDir, PathBuf, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let (scans, recipe) = (dir.path().join("scans"), dir.path().join("recipe.toml"));
     fs::create_dir(&scans).unwrap();
@@ -45,7 +45,7 @@ fn cohort(n: usize) -> (tempfile::TempDir, PathBuf, PathBuf) {
     (dir, scans, recipe)
 }
 
-fn rows(out: &Path) -> Vec<Row> {
+pub fn rows(out: &Path) -> Vec<Row> {
     table::read(&out.join("results.csv")).unwrap()
 }
 

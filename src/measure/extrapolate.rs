@@ -113,6 +113,13 @@ fn limit(series: &[&Row]) -> Option<Row> {
         .iter()
         .filter_map(|r| r.algebraic_error_mpa)
         .fold(0.0, f64::max);
+    let finest_ones = series.iter().filter(|r| r.lp_mm == finest.lp_mm);
+    let note = finest_ones
+        .filter_map(|r| r.note.as_ref())
+        .fold(words, |all, note| match all.contains(note) {
+            true => all,
+            false => format!("{all}; {note}"),
+        });
     Some(Row {
         boundary: Some(EXTRAPOLATED.to_owned()),
         registration: None,
@@ -120,7 +127,7 @@ fn limit(series: &[&Row]) -> Option<Row> {
         algebraic_error_mpa: Some(algebraic),
         discretization_error_mpa: Some(error_mpa),
         wall_s: series.iter().map(|r| r.wall_s).sum(),
-        note: Some(words),
+        note: Some(note),
         ..settings_of(finest)
     })
 }
@@ -295,7 +302,10 @@ mod tests {
     #[test]
     fn voxel_elements_of_order_1_3_are_taken_to_their_limit() {
         let e = |h: f64| 50.0 + 300.0 * h.powf(1.3);
-        let all = with_extrapolated(&[row(None, 0.02, e(0.02)), row(None, 0.01, e(0.01))]);
+        let mut fine = row(None, 0.01, e(0.01));
+        fine.note = Some("of the finest".to_owned());
+        let all = with_extrapolated(&[row(None, 0.02, e(0.02)), fine]);
+        assert!(all[2].note.as_ref().unwrap().ends_with("; of the finest"));
         assert_eq!(all[2].method, "voxel-fe");
         assert!(
             (all[2].e_app_mpa.unwrap() - 50.0).abs() < 1e-9,

@@ -53,7 +53,7 @@ pub fn settings_of(row: &Row) -> Row {
     }
 }
 
-/// Moduli are means, sites and times are sums, the rest is missing.
+/// Moduli are means, sites and times are sums, it is converged where both are; the rest is missing.
 fn mean_row(a: &Row, b: &Row) -> Row {
     let both = |x: Option<f64>, y: Option<f64>| Some(x? + y?);
     let mean = |x, y| both(x, y).map(|sum| 0.5 * sum);
@@ -69,8 +69,17 @@ fn mean_row(a: &Row, b: &Row) -> Row {
             .zip(b.e_app_mpa)
             .map(|(x, y)| 0.5 * (x - y).abs()),
         wall_s: both(a.wall_s, b.wall_s),
+        converged: both_converged(a, b),
         note: unconverged(a, b),
         ..settings_of(a)
+    }
+}
+
+/// None where it is not known of either.
+fn both_converged(a: &Row, b: &Row) -> Option<bool> {
+    match (a.converged, b.converged) {
+        (Some(false), _) | (_, Some(false)) => Some(false),
+        (x, y) => x.and(y),
     }
 }
 
@@ -112,8 +121,26 @@ mod tests {
         assert_eq!(mean.boundary.as_deref(), Some("ffb"));
         assert_eq!((mean.lp_mm, mean.e_app_mpa), (0.1, Some(20.0)));
         assert_eq!((mean.sites, mean.wall_s), (Some(20), Some(4.0)));
-        assert_eq!((mean.e_app_stress_mpa, mean.converged), (None, None));
+        assert_eq!(mean.e_app_stress_mpa, None);
+        assert_eq!(mean.converged, Some(false), "firm is not");
         assert!(mean.note.as_ref().unwrap().contains("not converged"));
+    }
+
+    #[test]
+    fn a_mean_is_converged_where_both_its_parts_are() {
+        let with = |firm, floppy| {
+            let part = |boundary, converged| Row {
+                converged,
+                ..row(boundary, 0.1, 1.0)
+            };
+            with_ffb(&[part("firm", firm), part("floppy", floppy)])[2].converged
+        };
+        let (yes, no) = (Some(true), Some(false));
+        assert_eq!(
+            [with(yes, yes), with(yes, no), with(no, yes)],
+            [yes, no, no]
+        );
+        assert_eq!([with(None, yes), with(None, no)], [None, no]);
     }
 
     #[test]

@@ -7,6 +7,8 @@ use crate::error::Result;
 use crate::measure::extrapolate::{EXTRAPOLATED, expected_of_pair, with_extrapolated};
 use crate::measure::row::Row;
 use crate::measure::thickness::plate_thickness_mm;
+use crate::run::missed::Missed;
+use crate::run::results::Results;
 use crate::run::segment::load;
 use crate::run::session::Session;
 use crate::run::solve::{in_words, solve};
@@ -42,6 +44,10 @@ pub struct Found {
 /// As [`solve`].
 pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session) -> Result<Found> {
     let specimen = load(dir)?;
+    if !session.dry_run {
+        // Of an earlier error asked for.
+        Results::open(dir, false)?.renote(Missed::take_back)?;
+    }
     let mut rows = Vec::new();
     let params = SolveParams {
         // A tenth of the whole error is left to the solver.
@@ -80,7 +86,7 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         rows.extend(solve(dir, &lattices, &lattice, session)?);
         let broken = |r: &Row| r.e_app_mpa == Some(0.0);
         if !session.dry_run && (meets(&rows, target) || rows.iter().all(broken)) {
-            return Ok(finish(rows, target, session));
+            return finish(dir, rows, target, session);
         }
     }
     let elements = bone.as_slice().iter().filter(|b| **b != 0).count() as f64;
@@ -126,7 +132,7 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
             break;
         }
     }
-    Ok(finish(rows, target, session))
+    finish(dir, rows, target, session)
 }
 
 /// Edge of the finer elements of a pair.
@@ -179,10 +185,21 @@ pub fn meets(rows: &[Row], target: f64) -> bool {
     best(rows).is_some_and(|(_, error)| error <= target)
 }
 
-fn finish(rows: Vec<Row>, target: f64, session: &Session) -> Found {
-    let percent = |x: f64| format!("{:.2} %", 100.0 * x);
+fn said(target: f64, best: Option<(&Row, f64)>) -> String {
+    let least = best.map_or("no error could be stated".to_owned(), |(_, error)| {
+        format!("the least stated is {}", percent(error))
+    });
+    format!("{}, is not met: {least}", percent(target))
+}
+
+fn percent(x: f64) -> String {
+    format!("{:.2} %", 100.0 * x)
+}
+
+/// Says what came of it; where the target is missed, so do the rows, here and in the results.
+fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Result<Found> {
     if session.dry_run || rows.iter().all(|r| r.e_app_mpa == Some(0.0)) {
-        return Found { rows, met: true };
+        return Ok(Found { rows, met: true });
     }
     let met = meets(&rows, target);
     match best(&rows) {
@@ -200,5 +217,14 @@ fn finish(rows: Vec<Row>, target: f64, session: &Session) -> Found {
         )),
         None => session.warn("no error could be stated: no solve converged"),
     }
-    Found { rows, met }
+    if !met {
+        let nearest = best(&rows);
+        let missed = Missed::of(
+            nearest.map(|(row, _)| row).or(rows.last()),
+            said(target, nearest),
+        );
+        rows.iter_mut().for_each(|row| missed.note(row));
+        Results::open(dir, false)?.renote(|row| missed.note(row))?;
+    }
+    Ok(Found { rows, met })
 }

@@ -8,6 +8,7 @@ pub mod info;
 pub mod lattice;
 pub mod manifest;
 pub mod meter;
+mod missed;
 pub mod phantom;
 pub mod queue;
 pub mod report;
@@ -17,6 +18,7 @@ pub mod scene;
 pub mod segment;
 pub mod session;
 pub mod solve;
+mod solved;
 pub mod stiffness;
 
 /// How a command ended when nothing stopped it. Everything else is an [`crate::error::Error`] (exit 2).

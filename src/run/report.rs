@@ -1,15 +1,17 @@
 //! Owns `report` on disk: rows of any number of solved scans in; tables, plots and pages out.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::grid::Axis;
 use crate::io::html::{self, ScanPage, Source};
 use crate::io::specimen::{self, SegmentRecord};
 use crate::io::{atomic, markdown, plot, table};
+use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
 use crate::measure::spheres::Spread;
 use crate::recipe::Recipe;
 use crate::run::host;
 use crate::run::session::Session;
+use crate::run::solved::Solved;
 use crate::stage::report::{Report, ReportParams, report as assemble};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -45,15 +47,14 @@ pub fn write_failures(out: &Path, failures: &[Failure]) -> Result<()> {
     }
 }
 
-/// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Returns
-/// the files written.
+/// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Scans that
+/// were solved again in their own folders after the run are read from there. Returns the files written.
 pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<PathBuf>> {
-    let mut rows: Vec<Row> = Vec::new();
-    let mut failures: Vec<Failure> = Vec::new();
+    let mut found = Solved::default();
     for dir in dirs {
-        rows.extend(table::read(&results_file(dir)?)?);
-        failures.extend(failures_in(dir));
+        found.add(dir, session)?;
     }
+    let Solved { rows, failures } = found;
     session.detail(format!("{} rows from {} folders", rows.len(), dirs.len()));
     let recipe = dirs
         .iter()
@@ -62,19 +63,9 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
         .as_deref()
         .and_then(|text| Recipe::parse(text, Path::new(RECIPE)).ok())
         .map_or_else(ReportParams::default, |recipe| recipe.report);
+    // Means of older programs do not say whether they are converged.
+    let rows = with_ffb(&rows);
     write(&rows, &failures, &params, dirs, recipe, out, session)
-}
-
-fn results_file(dir: &Path) -> Result<PathBuf> {
-    let file = dir.join("results.csv");
-    match file.is_file() {
-        true => Ok(file),
-        false => Err(Error::file(
-            dir,
-            "expected a folder with results.csv, found none",
-            "name folders that `solve` or `run` has written to",
-        )),
-    }
 }
 
 /// Writes the report of `rows` into `out`. `dirs` are searched for what is known of the scans.

@@ -118,6 +118,19 @@ impl Results {
         if changed { self.write() } else { Ok(()) }
     }
 
+    /// Lets `change` look at, and change, the note of each solved row.
+    pub fn renote(&mut self, change: impl Fn(&mut Row)) -> Result<()> {
+        let before = self.record.rows.clone();
+        self.record
+            .rows
+            .iter_mut()
+            .for_each(|keyed| change(&mut keyed.row));
+        match self.record.rows == before {
+            true => Ok(()),
+            false => self.write(),
+        }
+    }
+
     fn write(&self) -> Result<()> {
         let solved: Vec<Row> = self
             .record

@@ -1,24 +1,28 @@
-"""What SciPy, statsmodels and NumPy find for the data of `src/measure/statistics/mod.rs`.
+"""What SciPy, statsmodels, pingouin and NumPy find for the data of `src/measure/statistics/mod.rs`.
 
-    python3 -m venv venv && venv/bin/pip install scipy statsmodels pandas
+    python3 -m venv venv && venv/bin/pip install scipy statsmodels pandas pingouin
     venv/bin/python tests/peers/statistics.py            # checks the values committed in the tests
     venv/bin/python tests/peers/statistics.py --print    # prints them
 
-Committed values were made with SciPy and statsmodels; a difference beyond 1e-9 relative exits 1.
+Committed values were made with SciPy, statsmodels and pingouin; a difference beyond 1e-9 relative exits 1.
 """
 
 import pathlib
 import re
 import sys
 
+# Peers import the standard module that this file's name would hide.
+sys.path.pop(0)
+
 try:
     import numpy as np
     import pandas as pd
+    import pingouin
     import scipy.stats
     import statsmodels.api as sm
     from statsmodels.stats.anova import AnovaRM
 except ImportError as missing:
-    sys.exit(f"skipped: {missing}; pip install scipy statsmodels pandas")
+    sys.exit(f"skipped: {missing}; pip install scipy statsmodels pandas pingouin")
 
 ROOT = pathlib.Path(__file__).resolve().parents[2] / "src/measure/statistics"
 
@@ -40,6 +44,12 @@ def expected():
         [(s, m, d[m][s]) for m in "ABC" for s in range(8)], columns=["specimen", "method", "value"]
     )
     table = AnovaRM(long, "value", "specimen", within=["method"]).fit().anova_table
+    corrected = pingouin.rm_anova(long, dv="value", within="method", subject="specimen", correction=True).iloc[0]
+    epsilon = pingouin.epsilon(long, dv="value", within="method", subject="specimen", correction="gg")
+    f = table["F Value"].iloc[0]
+    p_gg = scipy.stats.f.sf(f, 2 * epsilon, 14 * epsilon)
+    reported = next(corrected[name] for name in corrected.index if name.lower() in ("p-gg-corr", "p_gg_corr"))
+    assert abs(reported / p_gg - 1) < 1e-9, (reported, p_gg)
     q1, q2, q3 = np.percentile(d["A"], [25, 50, 75])
     return {
         "regression.rs": {
@@ -58,7 +68,7 @@ def expected():
             "BA_UPPER": bias + 1.96 * sd,
             "BA_P": scipy.stats.ttest_rel(d["A"], d["B"]).pvalue,
         },
-        "anova.rs": {"RM_F": table["F Value"].iloc[0], "RM_P": table["Pr > F"].iloc[0]},
+        "anova.rs": {"RM_F": table["F Value"].iloc[0], "RM_P": table["Pr > F"].iloc[0], "GG_EPSILON": epsilon, "GG_P": p_gg},
         "quartiles.rs": {"Q_1": q1, "Q_2": q2, "Q_3": q3},
     }
 

@@ -1,6 +1,6 @@
 //! Owns one-way analysis of variance with repeated measures: do methods differ on the same specimens?
 
-use super::mean;
+use super::{deviations, mean};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -12,8 +12,12 @@ pub struct Anova {
     /// Degrees of freedom of methods and of error.
     pub df_methods: usize,
     pub df_error: usize,
-    /// Sphericity assumed.
+    /// Sphericity assumed: differences between any two methods vary alike.
     pub p: f64,
+    /// How far from sphericity: 1 where it holds, 1 / (methods − 1) at worst.
+    pub epsilon: f64,
+    /// With both degrees of freedom times `epsilon` (Greenhouse and Geisser 1959, <https://doi.org/10.1007/BF02289823>).
+    pub p_greenhouse_geisser: f64,
 }
 
 /// `values[m][s]` is the value of method `m` on specimen `s`. None for fewer than two of either, or without any error.
@@ -40,25 +44,53 @@ pub fn repeated_measures(values: &[Vec<f64>]) -> Option<Anova> {
     }
     let (df_methods, df_error) = (k - 1, (k - 1) * (n - 1));
     let f = (between / df_methods as f64) / (error / df_error as f64);
-    let fisher = FisherSnedecor::new(df_methods as f64, df_error as f64).ok()?;
-    f.is_finite().then(|| Anova {
+    let epsilon = epsilon(values)?;
+    let p = |share: f64| {
+        let fisher = FisherSnedecor::new(share * df_methods as f64, share * df_error as f64);
+        Some(fisher.ok()?.sf(f))
+    };
+    f.is_finite().then_some(())?;
+    Some(Anova {
         specimens: n,
         methods: k,
         f,
         df_methods,
         df_error,
-        p: fisher.sf(f),
+        p: p(1.0)?,
+        epsilon,
+        p_greenhouse_geisser: p(epsilon)?,
     })
+}
+
+/// `(tr S)² / ((k − 1) Σ S_ij²)` of the covariance S of k methods over specimens, its rows' and columns' means taken off
+/// (Box 1954, <https://doi.org/10.1214/aoms/1177728717>). None where methods differ by constants only.
+fn epsilon(values: &[Vec<f64>]) -> Option<f64> {
+    let k = values.len();
+    let covariance: Vec<Vec<f64>> = values
+        .iter()
+        .map(|a| values.iter().map(|b| deviations(a, b)).collect())
+        .collect();
+    let of_row: Vec<f64> = covariance.iter().map(|row| mean(row)).collect();
+    let of_all = mean(&of_row);
+    let centred = |i: usize, j: usize| covariance[i][j] - of_row[i] - of_row[j] + of_all;
+    let trace: f64 = (0..k).map(|i| centred(i, i)).sum();
+    let squares: f64 = (0..k * k).map(|at| centred(at / k, at % k).powi(2)).sum();
+    let epsilon = trace * trace / ((k - 1) as f64 * squares);
+    let least = 1.0 / (k - 1) as f64;
+    epsilon.is_finite().then(|| epsilon.clamp(least, 1.0))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::agreement::agreement;
     use super::super::cases::{A, B, C, close};
     use super::*;
 
     // tests/peers/statistics.py
     const RM_F: f64 = 8.66360983166662;
     const RM_P: f64 = 0.0035599449605832065;
+    const GG_EPSILON: f64 = 0.5731214279270012;
+    const GG_P: f64 = 0.016524799104382513;
 
     #[test]
     fn f_and_p_are_those_of_statsmodels() {
@@ -66,6 +98,51 @@ mod tests {
         close(found.f, RM_F);
         close(found.p, RM_P);
         assert_eq!((found.df_methods, found.df_error), (2, 14));
+    }
+
+    #[test]
+    fn the_correction_is_that_of_pingouin() {
+        let found = repeated_measures(&[A.to_vec(), B.to_vec(), C.to_vec()]).unwrap();
+        close(found.epsilon, GG_EPSILON);
+        close(found.p_greenhouse_geisser, GG_P);
+    }
+
+    /// Closed form: F = t², whose p is the paired t test's; there is no sphericity to violate.
+    #[test]
+    fn of_two_methods_it_is_the_paired_t_test() {
+        let found = repeated_measures(&[A.to_vec(), B.to_vec()]).unwrap();
+        let t = agreement(&A, &B).unwrap();
+        close(found.f, (t.bias / t.sd).powi(2) * 8.0);
+        close(found.p, t.bias_p);
+        assert_eq!(found.epsilon, 1.0);
+        close(found.p_greenhouse_geisser, t.bias_p);
+    }
+
+    /// Closed form: the mean of two methods as a third leaves F = t² on one contrast, ε = 1/2, and the t test's p.
+    #[test]
+    fn a_third_method_that_follows_from_two_corrects_to_the_paired_t_test() {
+        let between: Vec<f64> = A.iter().zip(B).map(|(a, b)| 0.5 * (a + b)).collect();
+        let found = repeated_measures(&[A.to_vec(), between, B.to_vec()]).unwrap();
+        let t = agreement(&A, &B).unwrap();
+        close(found.f, (t.bias / t.sd).powi(2) * 8.0);
+        close(found.epsilon, 0.5);
+        close(found.p_greenhouse_geisser, t.bias_p);
+        assert!(found.p < 0.9 * t.bias_p, "{found:?}");
+    }
+
+    /// Closed form: contrasts of equal size that do not correlate are spherical.
+    #[test]
+    fn spherical_methods_need_no_correction() {
+        // Over four specimens both contrasts of three methods, orthogonal to each other.
+        let (u, v) = ([1.0, 1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0]);
+        let weights = [[0.5, 0.75f64.sqrt()], [0.5, -(0.75f64.sqrt())], [-1.0, 0.0]];
+        let values: Vec<Vec<f64>> = (0..3)
+            .map(|m| {
+                let of = |s: usize| weights[m][0] * u[s] + weights[m][1] * v[s] + m as f64;
+                (0..4).map(of).collect()
+            })
+            .collect();
+        close(repeated_measures(&values).unwrap().epsilon, 1.0);
     }
 
     #[test]

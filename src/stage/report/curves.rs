@@ -104,7 +104,7 @@ fn convergence_of(scan: &str, solved: &[Solved]) -> Figure {
             family: s.family.clone(),
             ..*s
         })
-        .partition(|s| s.family.model == Model::Extrapolated);
+        .partition(|s| s.family.model.is_limit());
     let widest = found.iter().map(|s| s.row.lp_mm).fold(0.0, f64::max);
     let mut curves_ = curves(&found, Mark::Joined, |members| {
         let mut points: Vec<Point> = members.iter().map(|s| with_error(s)).collect();
@@ -141,7 +141,8 @@ fn with_error(s: &Solved) -> Point {
 /// E_app of each scan's finest solve against its BV/TV, with the least-squares line of each method over three scans or
 /// more. None for fewer than two scans.
 pub fn against_bv_tv(rows: &[Row]) -> Option<Figure> {
-    let solved = solved(rows);
+    let mut solved = solved(rows);
+    solved.retain(|s| s.row.converged != Some(false));
     if distinct(solved.iter().map(|s| &s.row.scan)).len() < 2 {
         return None;
     }
@@ -270,14 +271,10 @@ pub fn speed_error(rows: &[Row]) -> Option<Figure> {
 }
 
 fn reference(own: &[&Solved]) -> Option<f64> {
-    let fe = |s: &&&Solved| s.row.method == "voxel-fe";
-    let extrapolated = own
-        .iter()
-        .filter(fe)
-        .find(|s| s.family.model == Model::Extrapolated);
+    let extrapolated = own.iter().find(|s| s.family.model == Model::VoxelFeLimit);
     let finest = own
         .iter()
-        .filter(fe)
+        .filter(|s| s.family.model == Model::VoxelFe)
         .min_by(|a, b| a.row.lp_mm.total_cmp(&b.row.lp_mm));
     extrapolated
         .or(finest)

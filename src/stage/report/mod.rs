@@ -1,7 +1,9 @@
 //! Owns the report: rows of solved scans in; tables, figures and notes out, as plain data.
 
+mod comparison;
 mod curves;
 pub mod figure;
+mod sample;
 pub mod statistics;
 pub mod table;
 
@@ -35,7 +37,7 @@ pub struct Report {
     pub lines: Vec<Line>,
     pub statistics: Statistics,
     pub figures: Vec<Figure>,
-    /// What a reader must know of single rows.
+    /// What a reader must know of single rows, and which of them statistics leave out.
     pub notes: Vec<String>,
 }
 
@@ -45,15 +47,19 @@ pub fn report(rows: &[Row], params: &ReportParams) -> Report {
     figures.extend(curves::against_bv_tv(rows));
     figures.extend(curves::wall_time(rows));
     figures.extend(curves::speed_error(rows));
-    let samples = statistics::samples(rows);
-    figures.extend(statistics::figures(&samples));
+    let (samples, left_out) = sample::samples(rows);
+    figures.extend(comparison::figures(&samples));
+    let statistics = statistics::statistics(&samples);
+    let mut notes = notes(rows);
+    notes.extend(left_out);
+    notes.extend(statistics.analysis_of_variance());
     Report {
         title: params.title.clone(),
         rows: rows.to_vec(),
         lines: table::lines(rows),
-        statistics: statistics::statistics(&samples),
+        statistics,
         figures,
-        notes: notes(rows),
+        notes,
     }
 }
 
@@ -96,17 +102,21 @@ pub enum Model {
     Ffb,
     Graded,
     VoxelFe,
-    Extrapolated,
+    /// Limit of graded lattices.
+    GradedLimit,
+    /// Limit of voxel FE.
+    VoxelFeLimit,
 }
 
 impl Model {
-    pub const ALL: [Model; 6] = [
+    pub const ALL: [Model; 7] = [
         Model::Floppy,
         Model::Firm,
         Model::Ffb,
         Model::Graded,
         Model::VoxelFe,
-        Model::Extrapolated,
+        Model::GradedLimit,
+        Model::VoxelFeLimit,
     ];
 
     /// None for a row of a kind this report does not know.
@@ -116,10 +126,16 @@ impl Model {
             Some("firm") => Some(Model::Firm),
             Some("ffb") => Some(Model::Ffb),
             Some("graded") => Some(Model::Graded),
-            Some("extrapolated") => Some(Model::Extrapolated),
+            Some("extrapolated") if row.method == "voxel-fe" => Some(Model::VoxelFeLimit),
+            Some("extrapolated") => Some(Model::GradedLimit),
             None if row.method == "voxel-fe" => Some(Model::VoxelFe),
             _ => None,
         }
+    }
+
+    /// A value in the limit, without a lattice parameter of its own.
+    pub fn is_limit(self) -> bool {
+        matches!(self, Model::GradedLimit | Model::VoxelFeLimit)
     }
 
     pub fn name(self) -> &'static str {
@@ -129,7 +145,8 @@ impl Model {
             "FFB mean",
             "graded",
             "voxel FE",
-            "extrapolated",
+            "graded, extrapolated",
+            "voxel FE, extrapolated",
         ][self as usize]
     }
 }

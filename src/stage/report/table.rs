@@ -19,13 +19,15 @@ pub struct Line {
     pub ffb_mpa: Option<f64>,
     pub graded_mpa: Option<f64>,
     pub voxel_fe_mpa: Option<f64>,
-    pub extrapolated_mpa: Option<f64>,
+    pub graded_extrapolated_mpa: Option<f64>,
+    pub voxel_fe_extrapolated_mpa: Option<f64>,
     pub floppy_over_tissue: Option<f64>,
     pub firm_over_tissue: Option<f64>,
     pub ffb_over_tissue: Option<f64>,
     pub graded_over_tissue: Option<f64>,
     pub voxel_fe_over_tissue: Option<f64>,
-    pub extrapolated_over_tissue: Option<f64>,
+    pub graded_extrapolated_over_tissue: Option<f64>,
+    pub voxel_fe_extrapolated_over_tissue: Option<f64>,
     /// All solves of the line together.
     pub wall_s: Option<f64>,
     /// Stated algebraic and discretisation error of each model's modulus in MPa, by [`Model`]. Not a column: the rows of
@@ -42,7 +44,8 @@ impl Line {
             Model::Ffb => self.ffb_mpa,
             Model::Graded => self.graded_mpa,
             Model::VoxelFe => self.voxel_fe_mpa,
-            Model::Extrapolated => self.extrapolated_mpa,
+            Model::GradedLimit => self.graded_extrapolated_mpa,
+            Model::VoxelFeLimit => self.voxel_fe_extrapolated_mpa,
         }
     }
 
@@ -59,9 +62,13 @@ impl Line {
             Model::Ffb => (&mut self.ffb_mpa, &mut self.ffb_over_tissue),
             Model::Graded => (&mut self.graded_mpa, &mut self.graded_over_tissue),
             Model::VoxelFe => (&mut self.voxel_fe_mpa, &mut self.voxel_fe_over_tissue),
-            Model::Extrapolated => (
-                &mut self.extrapolated_mpa,
-                &mut self.extrapolated_over_tissue,
+            Model::GradedLimit => (
+                &mut self.graded_extrapolated_mpa,
+                &mut self.graded_extrapolated_over_tissue,
+            ),
+            Model::VoxelFeLimit => (
+                &mut self.voxel_fe_extrapolated_mpa,
+                &mut self.voxel_fe_extrapolated_over_tissue,
             ),
         };
         *modulus = row.e_app_mpa;
@@ -116,7 +123,11 @@ fn settings(row: &Row) -> [String; 8] {
         format!("axis {}", row.axis),
         format!("load {}", row.load),
         format!("ends {}", row.ends),
-        format!("E {} MPa", row.young_mpa),
+        // By a law the bone's mean modulus is the scan's own, no setting.
+        match &row.material {
+            Some(law) => format!("tissue {law}"),
+            None => format!("E {} MPa", row.young_mpa),
+        },
         format!("ν {}", row.poisson),
         format!("strain {}", row.strain),
         format!("grip {} mm", row.grip_mm),

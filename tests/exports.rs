@@ -243,3 +243,30 @@ fn vtk_has_as_many_bytes_as_its_counts_ask_for() {
     let header = format!("\nLINES {} {}\n", sites.bonds(), 3 * sites.bonds()).len();
     assert_eq!(data - lines - header, 12 * sites.bonds());
 }
+
+/// A network of bonds has a Poisson's ratio of its own: said where it is written.
+#[test]
+fn lammps_data_are_told_to_be_of_a_quarter() {
+    use bonepd_ct::grid::Grid;
+    let dir = tempfile::tempdir().unwrap();
+    let (scan, out) = (dir.path().join("s.nii"), dir.path().join("out"));
+    let grid = Grid::new([8; 3], [0.05; 3]);
+    bonepd_ct::io::nifti::write(&scan, &Volume::from_vec(grid, vec![9i16; 512])).unwrap();
+    let [scan, out] = [&scan, &out].map(|path| path.to_str().unwrap());
+    assert_eq!(
+        crate::cli::run(&["segment", scan, "-o", out, "--lower", "1"]).0,
+        0
+    );
+    let said = |format: &str| {
+        let words = ["lattice", out, "--lp", "0.1", "--quiet", "--export", format];
+        let (code, _, stderr) = crate::cli::run(&words);
+        assert_eq!(code, 0, "{stderr}");
+        stderr
+    };
+    let words = said("lammps");
+    assert!(
+        words.contains("warning: ") && words.contains("solve --poisson 0.25"),
+        "{words}"
+    );
+    assert!(!said("vtk").contains("0.25"));
+}

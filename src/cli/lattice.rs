@@ -21,7 +21,8 @@ pub struct LatticeArgs {
     dir: PathBuf,
     #[command(flatten)]
     settings: LatticeSettings,
-    /// Also write each lattice for another program: lammps (data file), vtk (ParaView, OVITO)
+    /// Also write each lattice for another program: lammps (data file; bonds alone, so always of Poisson's ratio 0.25, where
+    /// `solve` takes 0.3 unless told otherwise), vtk (ParaView, OVITO)
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', value_parser = ["lammps", "vtk"])]
     export: Vec<String>,
     /// Of an exported model: different stiffnesses of bonds at most; more are rounded to the means of as many bins

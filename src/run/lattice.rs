@@ -83,6 +83,11 @@ pub fn lattice(
             "the folder keeps grey values, but the exported lattices are of one tissue: give --material for moduli that follow them",
         );
     }
+    if exports.formats.contains(&Export::Lammps) {
+        session.warn(
+            "LAMMPS data hold bonds alone, and a lattice of bonds alone has a Poisson's ratio of 0.25, whatever the tissue's (0.3 unless told otherwise): hold their results against `solve --poisson 0.25`",
+        );
+    }
     let mut lattices = Vec::new();
     for case in params.cases() {
         let summary = if case.in_pieces() {

@@ -33,6 +33,19 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
         )
     };
     let text = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    if let Err(e) = std::str::from_utf8(&text) {
+        let line = 1 + text[..e.valid_up_to()]
+            .iter()
+            .filter(|b| **b == b'\n')
+            .count();
+        return Err(Error::file(
+            path,
+            format!(
+                "line {line} is not UTF-8 text, as names with accents are where another encoding was chosen"
+            ),
+            "save it as UTF-8 (in Excel: Save as, CSV UTF-8; in R: fileEncoding = \"UTF-8\")",
+        ));
+    }
     let delimiter = delimiter(&text);
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter)
@@ -45,7 +58,7 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
     check_header(&header).map_err(wrong)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut jobs = Vec::new();
-    for (n, record) in reader.records().enumerate() {
+    for record in reader.records() {
         let record = record.map_err(|e| wrong(format!("cannot be read: {e}")))?;
         let cell = |column: &str| {
             let at = header.iter().position(|name| name == column)?;
@@ -54,15 +67,26 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
                 .filter(|cell| !cell.is_empty() && *cell != "NA")
         };
         let decimal_comma = delimiter != b',';
+        let line = record.position().map_or(0, csv::Position::line);
         let job = job(cell, decimal_comma, folder, params)
-            .map_err(|found| wrong(format!("line {}: {found}", n + 2)))?;
-        job.segment.check()?;
+            .map_err(|found| wrong(format!("line {line}: {found}")))?;
+        job.segment.check().map_err(|e| of_line(path, line, e))?;
         jobs.push(job);
     }
     if jobs.is_empty() {
         return Err(wrong("lists no scans".to_owned()));
     }
     Ok(jobs)
+}
+
+/// A setting that cannot be used, told with the line of the manifest that gives it.
+fn of_line(path: &Path, line: u64, e: Error) -> Error {
+    match e {
+        Error::Setting { key, found, advice } => {
+            Error::file(path, format!("line {line}: {key}: {found}"), advice)
+        }
+        other => other,
+    }
 }
 
 /// What divides the cells of the header.
@@ -216,13 +240,31 @@ mod tests {
     }
 
     #[test]
+    fn another_encoding_is_told_with_its_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cohort.csv");
+        // As Excel saves `CSV` in western Europe.
+        std::fs::write(&path, b"path,group\na.nii,OA\nb.nii,gr\xfcn\n").unwrap();
+        let words = read(&path, &SegmentParams::default())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            words.contains("line 3") && words.contains("save it as UTF-8"),
+            "{words}"
+        );
+    }
+
+    #[test]
     fn a_manifest_that_cannot_be_meant_is_said() {
         for (text, said) in [
             ("path,grup\na.nii,x\n", "did you mean `group`"),
             ("name\na\n", "no column `path`"),
             ("path,lower\na.nii,high\n", "line 2"),
             ("path,lower\n", "lists no scans"),
-            ("path,lower,upper\na.nii,9,3\n", "above upper"),
+            (
+                "path,lower,upper\na.nii,1,3\nb.nii,9,3\n",
+                "cohort.csv: line 3: segment.lower: lower 9 lies above upper 3",
+            ),
         ] {
             let words = read_text(text).unwrap_err().to_string();
             assert!(words.contains(said), "{text:?} said: {words}");

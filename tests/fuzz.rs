@@ -199,6 +199,13 @@ fn number(variable: &str, default: u64) -> u64 {
 }
 
 #[test]
+fn the_readme_counts_the_kinds_of_files() {
+    let readme = include_str!("../README.md");
+    let said = format!("damaged files of {} kinds", samples().len());
+    assert!(readme.contains(&said), "README.md does not say: {said}");
+}
+
+#[test]
 fn sound_samples_are_read() {
     for sample in samples() {
         let dir = folder_of(&sample);

@@ -105,38 +105,39 @@ fn tiff_of_every_packing() {
     assert_eq!(values("big.tif", &big), expected());
 }
 
-/// A page of one bit a pixel, 11 wide: rows start on bytes of their own. White is 0 where the page says so.
+/// A page of one bit a pixel, 11 wide: rows start on bytes of their own. White is 0 where `photometric` says so.
+pub fn bits(photometric: u16) -> Vec<u8> {
+    let rows = [[0b1010_0000, 0b0110_0000], [0b0000_0001, 0b1000_0000]];
+    let entries: [(u16, u32); 9] = [
+        (256, 11),
+        (257, 2),
+        (258, 1),
+        (259, 1),
+        (262, photometric.into()),
+        (273, 8 + 2 + 9 * 12 + 4),
+        (277, 1),
+        (278, 2),
+        (279, 4),
+    ];
+    let mut out = b"II*\0\x08\0\0\0\x09\0".to_vec();
+    for (tag, value) in entries {
+        out.extend([&tag.to_le_bytes()[..], &[4, 0, 1, 0, 0, 0]].concat());
+        out.extend(value.to_le_bytes());
+    }
+    out.extend([0; 4]);
+    out.extend(rows.as_flattened());
+    out
+}
+
 #[test]
 fn tiff_of_single_bits() {
-    let rows = [[0b1010_0000, 0b0110_0000], [0b0000_0001, 0b1000_0000]];
-    let bits = |photometric: u16| {
-        let entries: [(u16, u32); 9] = [
-            (256, 11),
-            (257, 2),
-            (258, 1),
-            (259, 1),
-            (262, photometric.into()),
-            (273, 8 + 2 + 9 * 12 + 4),
-            (277, 1),
-            (278, 2),
-            (279, 4),
-        ];
-        let mut out = b"II*\0\x08\0\0\0\x09\0".to_vec();
-        for (tag, value) in entries {
-            out.extend([&tag.to_le_bytes()[..], &[4, 0, 1, 0, 0, 0]].concat());
-            out.extend(value.to_le_bytes());
-        }
-        out.extend([0; 4]);
-        out.extend(rows.as_flattened());
-        values("bits.tif", &out)
-    };
     let set = [0, 2, 9, 10, 11 + 7, 11 + 8];
     let black_is_0: Vec<f32> = (0..22)
         .map(|i| f32::from(u8::from(set.contains(&i))))
         .collect();
-    assert_eq!(bits(1), black_is_0);
+    assert_eq!(values("bits.tif", &bits(1)), black_is_0);
     let white_is_0: Vec<f32> = black_is_0.iter().map(|v| 1.0 - v).collect();
-    assert_eq!(bits(0), white_is_0);
+    assert_eq!(values("bits.tif", &bits(0)), white_is_0);
 }
 
 #[test]
@@ -165,7 +166,7 @@ fn vax(value: f32) -> [u8; 4] {
 }
 
 /// An AIM of version 1.0 or 1.1 (its header is four bytes longer): type at 16, sizes at 20, frame at 32, edge at 68.
-fn aim_v1(header: usize, kind: i32, frame: i32, data: &[u8]) -> Vec<u8> {
+pub fn aim_v1(header: usize, kind: i32, frame: i32, data: &[u8]) -> Vec<u8> {
     let mut image = vec![0u8; header];
     let mut put = |at: usize, value: i32| image[at..at + 4].copy_from_slice(&value.to_le_bytes());
     put(16, kind);
@@ -200,4 +201,76 @@ fn aim_of_version_1_and_of_floats() {
         .map(|i| inner[20 + 5 * (1 + i / 3) + 1 + i % 3])
         .collect();
     assert_eq!(values("frame.aim", &framed), inner);
+}
+
+/// Names that mix cases and paddings: the number decides.
+#[test]
+fn slices_of_mixed_names_are_read_in_their_order() {
+    let dir = tempfile::tempdir().unwrap();
+    let names = ["scan_9.tif", "SCAN_10.TIF", "Scan_011.tiff"];
+    for (name, page) in names.iter().zip(volume().as_slice().chunks(20)) {
+        let file = std::fs::File::create(dir.path().join(name)).unwrap();
+        TiffEncoder::new(file)
+            .unwrap()
+            .write_image::<GrayI16>(5, 4, page)
+            .unwrap();
+    }
+    assert_eq!(read(dir.path()), expected());
+    // One series and no gap: or it is no scan.
+    for (from, to, said) in [
+        ("scan_9.tif", "scan_3.tif", "between the numbers 3 and 10"),
+        ("scan_3.tif", "other_9.tif", "slices of 2 series"),
+        ("other_9.tif", "scan_10.tiff", "the same number"),
+    ] {
+        std::fs::rename(dir.path().join(from), dir.path().join(to)).unwrap();
+        let words = scan::read(dir.path(), None).unwrap_err().to_string();
+        assert!(words.contains(said), "{to}: {words}");
+    }
+}
+
+/// One page with a description.
+pub fn noted<C: ColorType>(text: &str, values: &[C::Inner]) -> Vec<u8>
+where
+    [C::Inner]: TiffValue,
+{
+    let mut out = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut out).unwrap();
+    let mut image = encoder.new_image::<C>(5, 4).unwrap();
+    image
+        .encoder()
+        .write_tag(tiff::tags::Tag::ImageDescription, text)
+        .unwrap();
+    image.write_data(values).unwrap();
+    out.into_inner()
+}
+
+/// ImageJ keeps negative values as unsigned ones with a line in its notes; slices have notes of their own.
+#[test]
+fn imagejs_line_is_applied() {
+    let dir = tempfile::tempdir().unwrap();
+    let hu = "ImageJ=1.54f\ncf=0\nc0=-32768.0\nc1=1.0\nvunit=HU\n";
+    for (k, page) in volume().as_slice().chunks(20).enumerate() {
+        let shifted: Vec<u16> = page
+            .iter()
+            .map(|&v| (i32::from(v) + 32768) as u16)
+            .collect();
+        let bytes = noted::<Gray16>(hu, &shifted);
+        assert_eq!(values("one.tif", &bytes), expected()[20 * k..20 * (k + 1)]);
+        std::fs::write(dir.path().join(format!("s{k}.tif")), bytes).unwrap();
+    }
+    let scan = scan::read(dir.path(), Some([0.02; 3])).unwrap();
+    assert_eq!(scan.volume.as_slice(), expected());
+    assert_eq!(scan.unit.as_deref(), Some("HU"));
+    assert!(
+        scan.notes[0].contains("-32768 + 1 · stored value"),
+        "{:?}",
+        scan.notes
+    );
+    // A curve is not applied, and that is said.
+    let path = dir.path().join("curve.tif");
+    let bytes = noted::<Gray8>("ImageJ=1.54f\ncf=3\nc0=1.0\nc1=2.0\nvunit=HU\n", &[7; 20]);
+    std::fs::write(&path, bytes).unwrap();
+    let scan = scan::read(&path, Some([0.02; 3])).unwrap();
+    assert_eq!((scan.volume.as_slice()[0], scan.unit), (7.0, None));
+    assert!(scan.notes[0].contains("not applied"), "{:?}", scan.notes);
 }

@@ -1,6 +1,7 @@
 //! Owns PNG and BMP slices. Neither carries a voxel size.
 
 use crate::error::{Error, Result};
+use crate::io::imagej::Grey;
 use crate::io::raw::MAX_EXPANSION;
 use crate::io::slices::Slice;
 use image::DynamicImage;
@@ -53,5 +54,6 @@ pub fn read_slice(path: &Path) -> Result<Slice> {
         stored_as,
         pixel_mm: None,
         slice_mm: None,
+        grey: Grey::default(),
     })
 }

@@ -1,7 +1,9 @@
 //! Owns folders of slices: which files belong, in which order, and their assembly into one volume.
 
 use crate::error::{Error, Result};
+use crate::io::imagej::Grey;
 use crate::io::scan::Stored;
+use crate::io::series::{self, Series};
 use crate::io::{bitmap, dicom, raw, tiff};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -17,10 +19,20 @@ pub struct Slice {
     /// Voxel size where the slice's file carries one; z is None where only the pixel's size is known.
     pub pixel_mm: Option<[f64; 2]>,
     pub slice_mm: Option<f64>,
+    /// What ImageJ notes of the values; they are as it says.
+    pub grey: Grey,
 }
 
-/// Files of a folder that are slices of one scan, in natural order (`s2` before `s10`).
+/// Files of a folder that are slices of one scan, in order: DICOM's by their names (`s2` before `s10`; their positions decide
+/// later), others by the number in the name.
+///
+/// # Errors
+/// No slices, several kinds of them, several series, missing slices.
 pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    Ok(listed(folder)?.files)
+}
+
+fn listed(folder: &Path) -> Result<Series> {
     let unreadable = |e: std::io::Error| {
         Error::file(
             folder,
@@ -54,7 +66,13 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
             "give a folder of slices (TIFF, PNG, BMP or DICOM), or a scan file",
         ));
     }
-    Ok(found)
+    match kind(&found[0]) {
+        Some("dcm") => Ok(Series {
+            files: found,
+            step: 1,
+        }),
+        _ => series::ordered(folder, found),
+    }
 }
 
 fn file_name(path: &Path) -> String {
@@ -123,7 +141,7 @@ pub fn natural(a: &str, b: &str) -> std::cmp::Ordering {
 
 /// Reads a folder as one scan.
 pub fn read(folder: &Path) -> Result<Stored> {
-    let files = files(folder)?;
+    let Series { files, step } = listed(folder)?;
     match (kind(&files[0]), files.as_slice()) {
         (Some("dcm"), _) => return dicom::read(folder, &files),
         (Some("tif"), [only]) => return tiff::read(only),
@@ -160,7 +178,12 @@ pub fn read(folder: &Path) -> Result<Stored> {
         out.copy_from_slice(&slice.values);
         Ok(())
     })?;
-    let mut notes = Vec::new();
+    let mut notes = first.grey.notes();
+    if step > 1 {
+        notes.push(format!(
+            "the slices' numbers go in steps of {step}: if slices were left out, their distance is larger than in the scanner (--spacing)"
+        ));
+    }
     let mut spacing_mm = spacing(&first, &mut notes);
     if spacing_mm.is_none()
         && let Some(mm) = logged_pixel_mm(folder)
@@ -179,6 +202,7 @@ pub fn read(folder: &Path) -> Result<Stored> {
         n: [nx, ny, nz],
         values,
         spacing_mm,
+        unit: first.grey.unit(),
         notes,
         ..Stored::default()
     })

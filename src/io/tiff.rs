@@ -1,6 +1,7 @@
 //! Owns TIFF: single slices, multi-page stacks, BigTIFF, ImageJ's stacks and their voxel sizes.
 
 use crate::error::{Error, Result};
+use crate::io::imagej::{Grey, imagej, unit_mm};
 use crate::io::raw::{self, Layout, Scalar};
 use crate::io::scan::Stored;
 use crate::io::slices::{self, Slice};
@@ -62,7 +63,9 @@ fn damaged(path: &Path, e: &tiff::TiffError) -> Error {
 /// Reads a file of one page.
 pub fn read_slice(path: &Path) -> Result<Slice> {
     let mut pages = open(path)?;
-    let slice = page(&mut pages, path)?;
+    let mut slice = page(&mut pages, path)?;
+    slice.grey = imagej(&description(&mut pages.decoder)).grey;
+    slice.grey.apply(&mut slice.values, slice.stored_as);
     if pages.decoder.more_images() {
         return Err(Error::file(
             path,
@@ -76,7 +79,7 @@ pub fn read_slice(path: &Path) -> Result<Slice> {
 /// Reads a stack in one file.
 pub fn read(path: &Path) -> Result<Stored> {
     let mut pages = open(path)?;
-    let facts = imagej(&description(&mut pages.decoder));
+    let mut facts = imagej(&description(&mut pages.decoder));
     let first = page(&mut pages, path)?;
     let (nx, ny) = (first.width, first.height);
     let mut notes = Vec::new();
@@ -114,11 +117,14 @@ pub fn read(path: &Path) -> Result<Stored> {
             "save the one channel and frame that holds the scan",
         ));
     }
+    facts.grey.apply(&mut values, stored_as);
+    notes.extend(facts.grey.notes());
     Ok(Stored {
         format: format!("TIFF stack, {stored_as}"),
         n: [nx, ny, nz],
         values,
         spacing_mm,
+        unit: facts.grey.unit(),
         notes,
         ..Stored::default()
     })
@@ -172,6 +178,7 @@ fn page(pages: &mut Pages, path: &Path) -> Result<Slice> {
         stored_as,
         pixel_mm,
         slice_mm,
+        grey: Grey::default(),
     })
 }
 
@@ -298,56 +305,6 @@ pub fn write_slices(folder: &Path, name: &str, volume: &Volume<i16>) -> Result<(
         crate::io::atomic::write(&path, bytes.into_inner())?;
     }
     Ok(())
-}
-
-/// What ImageJ notes in the first page's description.
-#[derive(Debug, Default, PartialEq)]
-struct ImageJ {
-    images: usize,
-    channels: usize,
-    frames: usize,
-    /// Millimetres per unit; None where the unit is pixels or unknown.
-    unit_mm: Option<f64>,
-    spacing: Option<f64>,
-}
-
-fn imagej(description: &str) -> ImageJ {
-    let mut found = ImageJ::default();
-    if !description.starts_with("ImageJ=") {
-        return found;
-    }
-    for (key, value) in description.lines().filter_map(|l| l.split_once('=')) {
-        let value = value.trim();
-        match key.trim() {
-            "images" => found.images = value.parse().unwrap_or(0),
-            "channels" => found.channels = value.parse().unwrap_or(0),
-            "frames" => found.frames = value.parse().unwrap_or(0),
-            "unit" => found.unit_mm = unit_mm(value),
-            "spacing" => {
-                found.spacing = value
-                    .parse()
-                    .ok()
-                    .filter(|s: &f64| s.is_finite() && *s > 0.0)
-            }
-            _ => {}
-        }
-    }
-    found
-}
-
-/// Millimetres per unit of length as Fiji spells it.
-pub fn unit_mm(unit: &str) -> Option<f64> {
-    Some(match unit.trim().to_lowercase().as_str() {
-        "mm" | "millimeter" | "millimeters" | "millimetre" => 1.0,
-        "um" | "µm" | "μm" | "\\u00b5m" | "micron" | "microns" | "micrometer" | "micrometre" => {
-            1e-3
-        }
-        "nm" | "nanometer" | "nanometre" => 1e-6,
-        "cm" | "centimeter" | "centimetre" => 10.0,
-        "m" | "meter" | "metre" => 1e3,
-        "inch" | "inches" | "in" => 25.4,
-        _ => return None,
-    })
 }
 
 fn description(d: &mut Decoder<BufReader<File>>) -> String {

@@ -162,12 +162,19 @@ fn tiffs() -> Vec<Sample> {
         alone("packbits.tif", small(TiffCompression::Packbits)),
         alone("big.tif", big.into_inner()),
         alone("imagej.tif", imagej()),
+        alone("bits.tif", crate::stored::bits(1)),
+        alone("ome.tif", ome()),
         Sample {
             name: "tiffs/s2.tif",
             bytes: small_page(),
             beside: vec![("tiffs/s10.tif", small_page())],
         },
     ]
+}
+
+fn ome() -> Vec<u8> {
+    let text = r#"<OME><Pixels PhysicalSizeX="20" PhysicalSizeY="20" PhysicalSizeZ="0.02" PhysicalSizeZUnit="mm"/></OME>"#;
+    crate::stored::noted::<colortype::GrayI16>(text, &volume().as_slice()[..20])
 }
 
 fn small_page() -> Vec<u8> {
@@ -181,7 +188,7 @@ fn small_page() -> Vec<u8> {
 
 /// One directory, three planes behind it: how ImageJ writes large stacks.
 fn imagej() -> Vec<u8> {
-    let text = b"ImageJ=1.53t\nimages=3\nslices=3\nunit=mm\nspacing=0.02\n\0";
+    let text = b"ImageJ=1.53t\nimages=3\nslices=3\nunit=mm\nspacing=0.02\ncf=0\nc0=-900.0\nc1=1.0\nvunit=HU\n\0";
     let entries = 11u16;
     let text_at = 8 + 2 + 12 * u32::from(entries) + 4;
     let rational_at = text_at + text.len() as u32;
@@ -270,6 +277,10 @@ fn scanco() -> Vec<Sample> {
     vec![
         alone("bits.aim", aim((6 << 16) + 1, 0, bits)),
         alone("runs.aim", aim((8 << 16) + 2, 1, runs)),
+        alone(
+            "v1.aim",
+            crate::stored::aim_v1(92, (2 << 16) + 2, 1, &le_bytes()),
+        ),
         alone("extended.isq", [isq, extended, le_bytes()].concat()),
     ]
 }

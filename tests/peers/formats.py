@@ -40,7 +40,8 @@ def check(name, path, world, spacing=SPACING, unit=None, extra=(), grey=None):
     try:
         info = ask("info", path)
         if spacing is not None:
-            assert np.allclose(sorted(info["spacing_mm"]), sorted(spacing), rtol=1e-6), info["spacing_mm"]
+            assert np.allclose(info["spacing_mm"], spacing, rtol=1e-6), info["spacing_mm"]
+        assert info["voxels"] == list(world.shape[::-1]), info["voxels"]
         if unit:
             assert info["unit"] == unit, info["unit"]
         if grey is not None:
@@ -124,7 +125,7 @@ def simpleitk_files(dir):
     for name in ("turned.mha", "turned.nrrd", "turned.nii.gz"):
         sitk.WriteImage(image, str(dir / name))
         ras = sitk.DICOMOrient(image, "RAS")
-        check(f"SimpleITK {name}", dir / name, (sitk.GetArrayFromImage(ras) > 2999.5).astype(np.uint8))
+        check(f"SimpleITK {name}", dir / name, (sitk.GetArrayFromImage(ras) > 2999.5).astype(np.uint8), ras.GetSpacing())
 
 
 def pydicom_files(dir):
@@ -177,6 +178,10 @@ def tifffile_files(dir):
     check("tifffile ImageJ hyperstack", dir / "ij.tif", world, iso)
     tifffile.imwrite(dir / "ij_um.tif", grey, imagej=True, resolution=(1 / 20, 1 / 20), metadata={"spacing": 50, "unit": "um", "axes": "ZYX"})
     check("tifffile ImageJ in um", dir / "ij_um.tif", world, iso)
+    # As ImageJ keeps negative values: unsigned, with a line in its notes.
+    signed = {**meta, "cf": 0, "c0": -32768.0, "c1": 1.0, "vunit": "HU"}
+    tifffile.imwrite(dir / "ij_hu.tif", (GREY.astype(np.int32) + 32768).astype(np.uint16), imagej=True, resolution=px, metadata=signed)
+    check("tifffile ImageJ, calibrated", dir / "ij_hu.tif", world, iso, unit="HU", grey=GREY)
     for name, more in {
         "bigtiff": {"bigtiff": True},
         "big-endian": {"byteorder": ">"},
@@ -215,6 +220,18 @@ def tifffile_files(dir):
     for k, page in enumerate(GREY):
         tifffile.imwrite(folder / f"s{k + 2}.tif", page, photometric="minisblack")
     check("tifffile folder, unpadded numbers", folder, world, None, extra=("--spacing", "0.02"))
+    for name in ("s5.tif", "s6.tif"):
+        (folder / name).rename(folder / name.upper())
+    check("tifffile folder, names of both cases", folder, world, None, extra=("--spacing", "0.02"))
+    (folder / "s4.tif").unlink()
+    try:
+        ask("info", folder)
+        FAILED.append("missing slice")
+        print("FAILED   tifffile folder, a slice missing: it was read")
+    except RuntimeError as e:
+        said = "between the numbers 3 and 5" in str(e)
+        print(f"{'ok      ' if said else 'FAILED  '} tifffile folder, a slice missing: refused")
+        FAILED.extend([] if said else ["missing slice"])
     raw = dir / "one_ifd.tif"
     tifffile.imwrite(raw, grey, imagej=True, resolution=px, metadata=meta, contiguous=True)
     check("tifffile ImageJ, contiguous", raw, world, iso)

@@ -469,3 +469,43 @@ fn a_stated_error_leaves_no_row_twice() {
         assert!(!rows[..at].contains(row), "{row:?}");
     }
 }
+
+/// Rows of another mask, or of a scan that fails now, are not left where they look current.
+#[test]
+fn results_that_no_longer_hold_are_set_aside() {
+    let (dir, scans, recipe) = cohort(2);
+    let out = dir.path().join("out");
+    let words = ["run", text(&recipe), text(&scans), "-o", text(&out)];
+    assert_eq!(run(&words).0, 0);
+    let (one, two) = (out.join("s1"), out.join("s2"));
+    let there = |dir: &Path| ["results.csv", "results.old.csv"].map(|f| dir.join(f).is_file());
+    let before = fs::read(one.join("results.csv")).unwrap();
+    let scan_1 = scans.join("s1.nii.gz");
+    let segment = |more: &[&str]| {
+        let words = ["segment", text(&scan_1), "-o", text(&one), "--lower", "500"];
+        let (code, _, stderr) = run(&[&words[..], more].concat());
+        assert_eq!(code, 0, "{stderr}");
+        stderr
+    };
+    // The same mask again: its results stay.
+    segment(&["--force"]);
+    assert_eq!(there(&one), [true, false]);
+    let said = segment(&["--crop", "0:18,0:18,2:16"]);
+    assert!(said.contains("results.old.csv"), "{said}");
+    assert_eq!(there(&one), [false, true]);
+    assert_eq!(fs::read(one.join("results.old.csv")).unwrap(), before);
+    // Solved again, nothing old is left.
+    assert_eq!(run(&["solve", text(&one)]).0, 0);
+    assert_eq!(there(&one), [true, false]);
+
+    fs::write(scans.join("s2.nii.gz"), "no image").unwrap();
+    assert_eq!(run(&words).0, 1);
+    assert_eq!(there(&two), [false, true]);
+    // Nor do they come back with the next scan that is run alone.
+    assert_eq!(run(&[&words[..], &["--only", "s1"]].concat()).0, 0);
+    assert!(rows(&out).iter().all(|row| row.scan == "s1"));
+    // Nothing is left to show.
+    fs::write(&scan_1, "no image").unwrap();
+    assert_eq!(run(&words).0, 1);
+    assert_eq!(there(&out), [false, true]);
+}

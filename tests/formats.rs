@@ -60,18 +60,23 @@ pub fn sound_files() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 fn aim_v3(data: &[u8]) -> Vec<u8> {
-    let log = b"! Mu_Scaling 8192\nHU: mu water 0.2409\nDensity: slope 1603.5\nDensity: intercept -391.2\nPatient Name  Doe-Zwiebelfisch\n";
+    let log = "! Mu_Scaling 8192\nHU: mu water 0.2409\nDensity: slope 1603.5\nDensity: intercept -391.2\nPatient Name  Doe-Zwiebelfisch\n";
+    aim_v3_of([5, 4, 3], [20_000; 3], log, data)
+}
+
+/// An AIM of shorts; `nano`: its voxel size in nm.
+pub fn aim_v3_of(n: [usize; 3], nano: [i64; 3], log: &str, data: &[u8]) -> Vec<u8> {
     let mut out = b"AIMDATA_V030   \0".to_vec();
     for size in [40i64, 224, log.len() as i64, data.len() as i64, 0] {
         out.extend(size.to_le_bytes());
     }
     let mut image = vec![0u8; 224];
     image[12..16].copy_from_slice(&((2i32 << 16) + 2).to_le_bytes());
-    for (a, n) in [5i64, 4, 3].into_iter().enumerate() {
-        image[40 + 8 * a..48 + 8 * a].copy_from_slice(&n.to_le_bytes());
-        image[184 + 8 * a..192 + 8 * a].copy_from_slice(&20_000i64.to_le_bytes());
+    for a in 0..3 {
+        image[40 + 8 * a..48 + 8 * a].copy_from_slice(&(n[a] as i64).to_le_bytes());
+        image[184 + 8 * a..192 + 8 * a].copy_from_slice(&nano[a].to_le_bytes());
     }
-    [out, image, log.to_vec(), data.to_vec()].concat()
+    [out, image, log.as_bytes().to_vec(), data.to_vec()].concat()
 }
 
 fn aim_v2_runs() -> Vec<u8> {

@@ -7,6 +7,9 @@
 use crate::cli::run;
 use bonepd_ct::io::table;
 use bonepd_ct::measure::row::Row;
+use bonepd_ct::recipe::Recipe;
+use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 fn at_root(path: &str) -> PathBuf {
@@ -138,4 +141,113 @@ fn bcc_against_sc_with_a_report_over_three_scans() {
     ] {
         assert!(report.join(file).is_file(), "{file}");
     }
+}
+
+/// A line `key = value` of a recipe, in use or in a comment, with the table it stands in.
+struct Line {
+    table: String,
+    key: String,
+    text: String,
+    comment: bool,
+}
+
+impl Line {
+    fn name(&self) -> String {
+        match self.table.is_empty() {
+            true => self.key.clone(),
+            false => format!("{}.{}", self.table, self.key),
+        }
+    }
+
+    /// The recipe that says this and nothing else.
+    fn alone(&self) -> Recipe {
+        let table = match self.table.is_empty() {
+            true => String::new(),
+            false => format!("[{}]\n", self.table),
+        };
+        let text = format!("{table}{}\n", self.text);
+        Recipe::parse(&text, Path::new("paper.toml")).unwrap_or_else(|e| panic!("{text}: {e}"))
+    }
+}
+
+fn lines(text: &str) -> Vec<Line> {
+    let (mut table, mut lines) = (String::new(), Vec::new());
+    for line in text.lines() {
+        if let Some(name) = line.strip_prefix('[').and_then(|l| l.strip_suffix(']')) {
+            table = name.to_owned();
+        }
+        let (comment, text) = match line.strip_prefix("# ") {
+            Some(text) => (true, text),
+            None => (false, line),
+        };
+        let Some((key, _)) = text.split_once(" = ") else {
+            continue;
+        };
+        if key.bytes().all(|c| c.is_ascii_lowercase() || c == b'_') {
+            lines.push(Line {
+                table: table.clone(),
+                key: key.to_owned(),
+                text: text.to_owned(),
+                comment,
+            });
+        }
+    }
+    lines
+}
+
+#[test]
+fn the_papers_recipe_names_every_key_with_its_default() {
+    let lines = lines(&std::fs::read_to_string(at_root("pipelines/paper.toml")).unwrap());
+    let Value::Object(known) = serde_json::to_value(Recipe::default()).unwrap() else {
+        panic!("a recipe is a table");
+    };
+    let keys: BTreeSet<String> = known
+        .iter()
+        .flat_map(|(table, inner)| match inner {
+            Value::Object(keys) => keys.keys().map(|key| format!("{table}.{key}")).collect(),
+            _ => vec![table.clone()],
+        })
+        .collect();
+    let named: BTreeSet<String> = lines.iter().map(Line::name).collect();
+    assert_eq!(named, keys);
+    assert_eq!(lines.len(), keys.len(), "a key stands twice");
+    for line in lines.iter().filter(|line| line.comment) {
+        let recipe = line.alone();
+        let default = known
+            .get(&line.table)
+            .map_or(&Value::Null, |t| &t[&line.key]);
+        // Examples stand where there is no default, or where an empty list is one.
+        let example = default.is_null() || line.key == "labels";
+        assert_eq!(recipe != Recipe::default(), example, "{}", line.name());
+    }
+}
+
+/// The same specimen as HU in NIfTI and as counts of a scanner: one mask.
+#[test]
+fn the_papers_window_is_of_hu_in_every_format() {
+    use bonepd_ct::io::scan;
+    use bonepd_ct::run::segment::in_memory;
+    use bonepd_ct::run::session::Session;
+    let recipe = Recipe::read(&at_root("pipelines/paper.toml")).unwrap();
+    let nifti = at_root("sample_data/trabecular.nii.gz");
+    let volume = scan::read(&nifti, None).unwrap().volume;
+    // Two counts a HU, from -1000 HU on: water has 0.25 / cm, and 8000 counts are 1 / cm.
+    let counts = volume.as_slice().iter().map(|hu| 2.0 * (hu + 1000.0));
+    let counts: Vec<u8> = counts.flat_map(|v| (v as i16).to_le_bytes()).collect();
+    let dir = tempfile::tempdir().unwrap();
+    let aim = dir.path().join("trabecular.aim");
+    let log = "! Mu_Scaling 8000\nHU: mu water 0.25\n";
+    let nano = volume.grid.spacing_mm.map(|mm| (mm * 1e6).round() as i64);
+    let bytes = crate::formats::aim_v3_of(volume.grid.n, nano, log, &counts);
+    std::fs::write(&aim, bytes).unwrap();
+    let session = Session::default();
+    let mask = |path: &Path| {
+        in_memory(path, None, &recipe.segment, &session)
+            .unwrap()
+            .bone
+    };
+    let (theirs, ours) = (mask(&aim), mask(&nifti));
+    assert_eq!(theirs.grid.n, ours.grid.n);
+    assert!(ours.as_slice().contains(&1));
+    assert!(theirs.as_slice() == ours.as_slice(), "the masks differ");
 }

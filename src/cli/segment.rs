@@ -27,11 +27,13 @@ pub struct SegmentArgs {
 #[derive(Args)]
 #[command(next_help_heading = "Segmentation")]
 pub struct SegmentSettings {
-    /// Voxel size in mm, one number or one per axis; overrides the file's
+    /// Voxel size in mm, one number or one per axis; overrides the file's. The axes are x, y, z as `info` prints them: those of
+    /// the patient or the world where the file tells how it lies in it, else as stored
     #[arg(long, value_name = "MM[,MM,MM]", value_parser = words::sizes)]
     spacing: Option<[f64; 3]>,
-    /// Grey values of Scanco files (AIM, ISQ): as stored, in HU, or in mg HA/cm³ [default: native]
-    #[arg(long, value_name = "UNIT", value_parser = words::choice::<GreyUnit>(&["native", "hu", "mgha"]))]
+    /// Grey values of Scanco files (AIM, ISQ), and so the threshold: as stored (native), in HU, or in mg HA/cm³; hu-where-known
+    /// leaves files without a calibration as they are, where hu refuses them [default: native, with a warning]
+    #[arg(long, value_name = "UNIT", value_parser = words::choice::<GreyUnit>(&["native", "hu", "mgha", "hu-where-known"]))]
     units: Option<GreyUnit>,
     /// Bone is this value or more, in the image's own units, after smoothing
     #[arg(long, value_name = "V", value_parser = words::number, allow_negative_numbers = true)]
@@ -52,7 +54,7 @@ pub struct SegmentSettings {
     /// on the scan's grid [default: box]
     #[arg(long, value_name = "VOI", value_parser = words::voi)]
     voi: Option<Voi>,
-    /// Keep voxels first:end along each axis; the end is not included
+    /// Keep voxels first:end along each axis (x, y, z as `info` prints them); the end is not included
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = words::crop)]
     crop: Option<[[usize; 2]; 3]>,
     /// Turn the scan so that this axis of it becomes z, the load axis; the other two follow [default: z]
@@ -100,7 +102,7 @@ impl SegmentSettings {
         }
         params.keep_grey |= self.keep_grey;
         params.spacing_mm = self.spacing.or(params.spacing_mm);
-        params.units = self.units.unwrap_or(params.units);
+        params.units = self.units.or(params.units);
         params.lower = self.lower.or(params.lower);
         params.upper = self.upper.or(params.upper);
         params.crop = self.crop.or(params.crop);

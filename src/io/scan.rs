@@ -39,6 +39,8 @@ pub struct Scan {
     pub path: PathBuf,
     pub format: String,
     pub unit: Option<String>,
+    /// What the file holds to turn stored values into HU and density, whether it was asked for or not.
+    pub calibration: Option<Calibration>,
     /// Axes x, y, z canonical where the file has an orientation, else as stored. May hold NaN and infinities.
     pub volume: Volume<f32>,
     pub details: Vec<(String, String)>,
@@ -48,13 +50,13 @@ pub struct Scan {
 
 /// Reads a scan in its own units. `spacing_mm` (x, y, z of the canonical axes) overrides the file's voxel size.
 pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
-    read_in(path, spacing_mm, GreyUnit::Native)
+    read_in(path, spacing_mm, None)
 }
 
-/// The same with a Scanco scan's grey values in `unit`.
-pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: GreyUnit) -> Result<Scan> {
+/// The same with a Scanco scan's grey values in `unit`; None: as stored.
+pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>) -> Result<Scan> {
     let mut stored = stored(path)?;
-    calibrate(&mut stored, unit, path)?;
+    calibrate(&mut stored, unit.unwrap_or(GreyUnit::Native), path)?;
     let mut notes = stored.notes;
     let found = stored
         .spacing_mm
@@ -87,6 +89,7 @@ pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: GreyUnit) -> Res
         path: path.to_path_buf(),
         format: stored.format,
         unit: stored.unit,
+        calibration: stored.calibration,
         volume,
         details: stored.details,
         notes,
@@ -106,7 +109,7 @@ pub fn read_as_stored(path: &Path, spacing_mm: [f64; 3]) -> Result<Volume<f32>> 
 fn calibrate(stored: &mut Stored, unit: GreyUnit, path: &Path) -> Result<()> {
     let Some(calibration) = stored.calibration else {
         let asked = match unit {
-            GreyUnit::Native => return Ok(()),
+            GreyUnit::Native | GreyUnit::HuWhereKnown => return Ok(()),
             GreyUnit::Hu => "HU",
             GreyUnit::Mgha => "mg HA/cm3",
         };
@@ -122,8 +125,11 @@ fn calibrate(stored: &mut Stored, unit: GreyUnit, path: &Path) -> Result<()> {
             )),
         };
     };
-    let ([slope, intercept], name) = calibration.line(unit, path)?;
-    if unit != GreyUnit::Native {
+    let ([slope, intercept], name) = match (unit, calibration.line(unit, path)) {
+        (GreyUnit::HuWhereKnown, Err(_)) => calibration.line(GreyUnit::Native, path)?,
+        (_, line) => line?,
+    };
+    if [slope, intercept] != [1.0, 0.0] {
         stored
             .values
             .par_iter_mut()

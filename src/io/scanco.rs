@@ -37,7 +37,7 @@ impl Calibration {
         };
         match unit {
             GreyUnit::Native => Ok(([1.0, 0.0], "native")),
-            GreyUnit::Hu => {
+            GreyUnit::Hu | GreyUnit::HuWhereKnown => {
                 let water = self
                     .mu_water
                     .filter(|v| *v > 0.0)

@@ -7,7 +7,7 @@ use crate::recipe::Recipe;
 use crate::run::estimate::{Estimate, estimate, of_specimen};
 use crate::run::queue;
 use crate::run::report::Failure;
-use crate::run::results::Results;
+use crate::run::results::{self, Results};
 use crate::run::scans::{self, ScanJob, Selection};
 use crate::run::session::Session;
 use crate::run::{Outcome, adaptive, host, lattice, report, segment, solve};
@@ -133,6 +133,9 @@ impl Run<'_> {
             }
             Err(e) => {
                 own.note(&format!("failed: {e}"));
+                if results::set_aside(&dir) {
+                    own.note("the results of an earlier run are set aside");
+                }
                 if self.jobs.len() > 1 {
                     own.flush();
                     self.session.warn(format!("{} failed: {e}", job.name));
@@ -154,15 +157,16 @@ impl Run<'_> {
             match self.job(name) {
                 Some(i) => rows.extend(done[i].iter().flatten().flatten().cloned()),
                 None => {
-                    let file = self.out.join(name).join("results.csv");
+                    let file = self.out.join(name).join(results::TABLE);
                     if file.is_file() {
                         rows.extend(table::read::<Row>(&file)?);
                     }
                 }
             }
         }
-        if !rows.is_empty() {
-            table::write(&self.out.join("results.csv"), &rows)?;
+        match rows.is_empty() {
+            true => drop(results::set_aside(self.out)),
+            false => results::write_table(self.out, &rows)?,
         }
         Ok(rows)
     }

@@ -1,6 +1,7 @@
 //! Owns `info`: what is known of a scan, without segmenting it.
 
 use crate::error::Result;
+use crate::io::orient::Turn;
 use crate::io::scan;
 use crate::io::scanco::Calibration;
 use crate::mask::threshold;
@@ -13,8 +14,9 @@ use std::path::Path;
 pub struct ScanInfo {
     pub scan: String,
     pub format: String,
+    /// Along x, y, z of the axes turned to the file's orientation, as all commands use them.
     pub voxels: [usize; 3],
-    /// None where the file does not say.
+    /// None where the file does not say. Along the same axes.
     pub spacing_mm: Option<[f64; 3]>,
     pub size_mm: Option<[f64; 3]>,
     /// Unit of the grey values where known.
@@ -57,14 +59,16 @@ pub fn info(file: &Path) -> Result<ScanInfo> {
     let otsu = otsu(&sorted);
     let above = |t: f64| sorted.len() - sorted.partition_point(|&v| f64::from(v) < t);
     let otsu_share = otsu.map(|t| above(t) as f64 / sorted.len() as f64);
-    let size = stored
-        .spacing_mm
-        .map(|s| std::array::from_fn(|a| s[a] * stored.n[a] as f64));
+    let turn = stored.affine.as_ref().and_then(Turn::of);
+    let from = turn.map_or([0, 1, 2], |turn| turn.from);
+    let voxels = from.map(|a| stored.n[a]);
+    let spacing = stored.spacing_mm.map(|s| from.map(|a| s[a]));
+    let size = spacing.map(|s| std::array::from_fn(|a| s[a] * voxels[a] as f64));
     let mut info = ScanInfo {
         scan: scan::name(file),
         format: stored.format,
-        voxels: stored.n,
-        spacing_mm: stored.spacing_mm,
+        voxels,
+        spacing_mm: spacing,
         size_mm: size,
         unit: stored.unit,
         grey_min: some.then(|| at(0.0)),
@@ -85,13 +89,20 @@ pub fn info(file: &Path) -> Result<ScanInfo> {
         notes: stored.notes,
         lines: Vec::new(),
     };
-    if let Some(turn) = stored.affine.as_ref().and_then(crate::io::orient::Turn::of) {
+    if let Some(turn) = turn {
         let words = if turn.is_identity() {
             "canonical (x right, y front, z up)".into()
         } else {
-            turn.words()
+            format!("axes are turned: {}", turn.words())
         };
         info.details.push(("orientation".into(), words));
+    }
+    if from != [0, 1, 2] {
+        let [i, j, k] = stored.n;
+        let size = stored.spacing_mm.map(triple);
+        let size = size.map_or(String::new(), |size| format!(", {size} mm each"));
+        let words = format!("{i} × {j} × {k} voxels along i, j, k{size}");
+        info.details.push(("as stored".into(), words));
     }
     info.lines = lines(&info);
     Ok(info)
@@ -125,8 +136,11 @@ fn labels(sorted: &[f32]) -> Vec<(f32, u64)> {
     found
 }
 
+fn triple(v: [f64; 3]) -> String {
+    format!("{} × {} × {}", short(v[0]), short(v[1]), short(v[2]))
+}
+
 fn lines(info: &ScanInfo) -> Vec<String> {
-    let triple = |v: [f64; 3]| format!("{} × {} × {}", short(v[0]), short(v[1]), short(v[2]));
     let [nx, ny, nz] = info.voxels;
     let mut lines = vec![
         format!("scan         {}", info.scan),
@@ -201,7 +215,11 @@ fn suggestion(info: &ScanInfo) -> Vec<String> {
         short(t),
         100.0 * share
     );
+    let mut lower = "--lower";
     if let Some(calibration) = info.calibration {
+        if calibration.line(GreyUnit::Hu, Path::new("")).is_ok() {
+            lower = "--units hu --lower";
+        }
         for unit in [GreyUnit::Hu, GreyUnit::Mgha] {
             if let Ok(([slope, intercept], name)) = calibration.line(unit, Path::new("")) {
                 line += &format!("; {} {name}", short(slope * t + intercept));
@@ -209,7 +227,9 @@ fn suggestion(info: &ScanInfo) -> Vec<String> {
         }
     }
     lines.push(line);
-    lines.push("suggestion   segment --otsu, or --lower with the threshold of your protocol; look at segment.png".into());
+    lines.push(format!(
+        "suggestion   segment --otsu, or {lower} with the threshold of your protocol; look at segment.png"
+    ));
     lines
 }
 

@@ -8,10 +8,44 @@ use crate::measure::extrapolate::with_extrapolated;
 use crate::measure::ffb::with_ffb;
 use crate::measure::row::Row;
 use crate::run::host;
+use crate::run::session::Session;
 use crate::stage::solve::SolveParams;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+
+/// The rows of a scan, or of a run, for other programs.
+pub const TABLE: &str = "results.csv";
+
+/// Where the rows of an earlier mask, or of a scan that failed since, are set aside; gone with the next solve.
+const OLD_TABLE: &str = "results.old.csv";
+
+/// Renames `results.csv`, whose rows no longer belong to what else is in the folder, so that nothing takes them for
+/// current. True if there was one.
+pub fn set_aside(dir: &Path) -> bool {
+    std::fs::rename(dir.join(TABLE), dir.join(OLD_TABLE)).is_ok()
+}
+
+/// The same where the mask in `dir` is not that of the results.
+pub fn set_aside_stale(dir: &Path, session: &Session) {
+    let (Some(old), Ok(now)) = (Record::read(dir), Provenance::now(dir)) else {
+        return;
+    };
+    let stale = !session.dry_run && old.provenance.mask_blake3 != now.mask_blake3;
+    if stale && set_aside(dir) {
+        session.say(format!(
+            "{}: the mask is another one: the results of the old one are set aside as {OLD_TABLE}",
+            dir.display()
+        ));
+    }
+}
+
+/// Writes `results.csv`; an older one that was set aside goes.
+pub fn write_table(dir: &Path, rows: &[Row]) -> Result<()> {
+    table::write(&dir.join(TABLE), rows)?;
+    let _ = std::fs::remove_file(dir.join(OLD_TABLE));
+    Ok(())
+}
 
 /// The content of `results.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,8 +94,7 @@ impl Results {
     /// A mask that cannot be read.
     pub fn open(dir: &Path, redo: bool) -> Result<Self> {
         let provenance = Provenance::now(dir)?;
-        let old = std::fs::read(dir.join("results.json")).ok();
-        let old: Option<Record> = old.and_then(|text| serde_json::from_slice(&text).ok());
+        let old = Record::read(dir);
         let same = |r: &Record| {
             r.provenance.mask_blake3 == provenance.mask_blake3
                 && r.provenance.version == provenance.version
@@ -157,7 +190,15 @@ impl Results {
         };
         let text = serde_json::to_string_pretty(&record).expect("plain data");
         atomic::write(&self.dir.join("results.json"), text)?;
-        table::write(&self.dir.join("results.csv"), &rows)
+        write_table(&self.dir, &rows)
+    }
+}
+
+impl Record {
+    /// None where there is none, or an older program wrote another kind.
+    fn read(dir: &Path) -> Option<Self> {
+        let text = std::fs::read(dir.join("results.json")).ok()?;
+        serde_json::from_slice(&text).ok()
     }
 }
 

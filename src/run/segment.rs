@@ -5,8 +5,9 @@ use crate::io::scan::Scan;
 use crate::io::specimen::{self, Input, SegmentRecord};
 use crate::io::{atomic, picture, scan};
 use crate::measure::spheres::Spread;
+use crate::run::results;
 use crate::run::session::Session;
-use crate::stage::segment::{self as stage, SegmentParams, Voi};
+use crate::stage::segment::{self as stage, GreyUnit, SegmentParams, Voi};
 use crate::volume::{Specimen, Volume};
 use std::path::Path;
 
@@ -33,10 +34,13 @@ pub fn segment(
         && up_to_date(&kept, dir, params, (&blake3, &voi_blake3))
     {
         session.say(format!("{}: up to date", dir.display()));
+        results::set_aside_stale(dir, session);
         return Ok(kept);
     }
     let (scan, voi_mask) = read(input, name, params, session)?;
-    let segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
+    let mut segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
+    let warnings = &mut segmented.summary.warnings;
+    warnings.extend(threshold_in_counts(&scan, params));
     let record = SegmentRecord {
         program: env!("CARGO_PKG_NAME").into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -55,6 +59,7 @@ pub fn segment(
     say(&record, session);
     if !session.dry_run {
         write(dir, &record, &segmented.scan, &segmented.specimen)?;
+        results::set_aside_stale(dir, session);
     }
     Ok(record)
 }
@@ -70,6 +75,9 @@ pub fn in_memory(
     session: &Session,
 ) -> Result<Specimen> {
     let (scan, voi_mask) = read(input, name, params, session)?;
+    if let Some(warning) = threshold_in_counts(&scan, params) {
+        session.warn_of(Some(&scan.name), warning);
+    }
     Ok(stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?.specimen)
 }
 
@@ -95,6 +103,37 @@ fn read(
         _ => None,
     };
     Ok((scan, voi_mask))
+}
+
+/// A threshold that was meant in HU and taken in a scanner's counts selects something else, and nothing looks amiss: said
+/// unless counts were asked for.
+fn threshold_in_counts(scan: &Scan, params: &SegmentParams) -> Option<String> {
+    let calibration = scan.calibration?;
+    let stored = scan.unit.as_deref() == Some("native");
+    if !stored || !params.has_window() || params.units == Some(GreyUnit::Native) {
+        return None;
+    }
+    let bounds = [("lower", params.lower), ("upper", params.upper)];
+    let said = |line: Option<([f64; 2], &str)>| -> String {
+        let words = bounds.iter().filter_map(|&(name, bound)| match line {
+            None => Some(format!("{name} {}", bound?)),
+            Some(([slope, intercept], unit)) => {
+                Some(format!("{name} {:.1} {unit}", slope * bound? + intercept))
+            }
+        });
+        words.collect::<Vec<_>>().join(", ")
+    };
+    let hu = calibration.line(GreyUnit::Hu, &scan.path).ok();
+    let counts = said(None);
+    Some(match hu {
+        Some(line) => format!(
+            "the threshold ({counts}) was taken in the scanner's stored counts, not in HU: by the file's calibration it is {}. If it was meant in HU, give --units hu (in a recipe: units = \"hu\"); for mg HA/cm³ mgha, and native if counts are meant",
+            said(Some(line))
+        ),
+        None => format!(
+            "the threshold ({counts}) was taken in the scanner's stored counts: the file holds no calibration to HU. Give it in counts, with --units native, or a file that kept its calibration"
+        ),
+    })
 }
 
 /// The specimen that `segment` left in `dir`.

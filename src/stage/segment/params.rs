@@ -23,13 +23,14 @@ pub enum Voi {
 }
 
 /// What the grey values of a Scanco scan shall mean. Other formats are read in the unit that they were saved in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum GreyUnit {
     /// As stored.
-    #[default]
     Native,
     Hu,
+    /// HU where the file holds a calibration to it, else as stored: for recipes that take scans of several formats.
+    HuWhereKnown,
     /// Bone mineral density, mg HA/cm³.
     Mgha,
 }
@@ -61,8 +62,8 @@ pub enum AlignBox {
 pub struct SegmentParams {
     /// Overrides the file's voxel size.
     pub spacing_mm: Option<[f64; 3]>,
-    /// Of a Scanco scan's grey values, and so of the window.
-    pub units: GreyUnit,
+    /// Of a Scanco scan's grey values, and so of the window. None: as stored, with a warning where a window is given.
+    pub units: Option<GreyUnit>,
     pub lower: Option<f64>,
     pub upper: Option<f64>,
     /// Otsu's threshold instead of a window.
@@ -102,6 +103,11 @@ impl SegmentParams {
             true if self.otsu => "otsu",
             true => "window",
         }
+    }
+
+    /// Whether a window, in the image's own units, tells bone.
+    pub fn has_window(&self) -> bool {
+        !self.otsu && (self.lower.is_some() || self.upper.is_some())
     }
 
     /// Whether the values of bone voxels are kept beside the mask.

@@ -60,13 +60,15 @@ fn statistics_text(statistics: &Statistics) -> String {
     }
     if let Some(a) = &statistics.anova {
         text += &format!(
-            "\nRepeated-measures analysis of variance between {} methods over {} scans: F({}, {}) = {}, p = {:.2e} (sphericity assumed).\n",
+            "\nRepeated-measures analysis of variance between {} methods over {} scans: F({}, {}) = {}, p = {:.2e} if spherical; Greenhouse–Geisser ε = {}, p = {:.2e}.\n",
             a.methods,
             a.specimens,
             a.df_methods,
             a.df_error,
             digits(Some(a.f)),
-            a.p
+            a.p,
+            digits(Some(a.epsilon)),
+            a.p_greenhouse_geisser
         );
     }
     text

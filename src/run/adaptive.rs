@@ -48,6 +48,14 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         // Of an earlier error asked for.
         Results::open(dir, false)?.renote(Missed::take_back)?;
     }
+    if session.force && !session.dry_run {
+        Results::begin_anew(dir)?;
+    }
+    // Dropped once: redone at every step, each would drop what the one before it solved.
+    let session = &Session {
+        force: false,
+        ..session.clone()
+    };
     let mut rows = Vec::new();
     let params = SolveParams {
         // A tenth of the whole error is left to the solver.

@@ -164,6 +164,14 @@ impl Results {
         }
     }
 
+    /// Drops what is kept in `dir`.
+    ///
+    /// # Errors
+    /// As [`Results::open`], and files that cannot be written.
+    pub fn begin_anew(dir: &Path) -> Result<()> {
+        Results::open(dir, true)?.write()
+    }
+
     fn write(&self) -> Result<()> {
         let solved: Vec<Row> = self
             .record

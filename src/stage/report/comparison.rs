@@ -5,6 +5,9 @@ use super::sample::Sample;
 use super::statistics::{Comparison, against_reference, groups, of_group, reference};
 use crate::measure::statistics::agreement::agreement;
 
+/// Letters below an axis of boxes; more would run into each other.
+const LABELS: usize = 48;
+
 /// Empty for fewer than three scans.
 pub fn figures(samples: &[Sample]) -> Vec<Figure> {
     if samples.is_empty() {
@@ -19,27 +22,31 @@ pub fn figures(samples: &[Sample]) -> Vec<Figure> {
 }
 
 fn boxes(samples: &[Sample]) -> Figure {
-    let n = samples[0].cases.len();
-    let same = samples.iter().all(|s| s.cases.len() == n);
-    let label = |s: &Sample| match same {
-        true => s.method.clone(),
-        false => format!("{}, n = {}", s.method, s.cases.len()),
-    };
-    let scans = if same {
-        format!("{n} scans")
-    } else {
-        "Scans".to_owned()
-    };
+    let names: Vec<String> = samples.iter().map(|s| s.method.clone()).collect();
+    let fit = names.iter().map(String::len).sum::<usize>() <= LABELS;
+    let with_n = samples.iter().enumerate().map(|(i, s)| {
+        let number = if fit {
+            String::new()
+        } else {
+            format!("{}: ", i + 1)
+        };
+        format!("{number}{} (n = {})", s.method, s.cases.len())
+    });
+    let labels = names.into_iter().enumerate().map(|(i, name)| match fit {
+        true => name,
+        false => (i + 1).to_string(),
+    });
     Figure {
         stem: "methods".to_owned(),
         scan: None,
         title: "Apparent modulus by method".to_owned(),
         caption: format!(
-            "{scans} at their finest lattice parameter. Box: quartiles; whiskers: 1.5 interquartile ranges; points: scans."
+            "Scans at their finest lattice parameter: {}. Box: quartiles; whiskers: 1.5 interquartile ranges; points: scans.",
+            with_n.collect::<Vec<_>>().join("; ")
         ),
         x: Axis::linear(""),
         y: Axis::linear("apparent modulus (MPa)"),
-        content: Content::Boxes(samples.iter().map(|s| (label(s), s.e_app_mpa())).collect()),
+        content: Content::Boxes(labels.zip(samples.iter().map(Sample::e_app_mpa)).collect()),
     }
 }
 
@@ -140,10 +147,10 @@ fn bland_altman(c: &Comparison) -> Figure {
         scan: None,
         title: format!("{method} against {reference}"),
         caption: format!(
-            "Differences over means of the two methods (Bland and Altman) of {n} scans, with the mean difference and its limits of agreement."
+            "{method} less {reference} over the mean of both (Bland and Altman), {n} scans, with the mean difference and its limits of agreement."
         ),
         x: Axis::linear("mean of both (MPa)"),
-        y: Axis::linear(&format!("{method} − {reference} (MPa)")),
+        y: Axis::linear("difference (MPa)"),
         content: Content::Curves(curves),
     }
 }
@@ -183,6 +190,11 @@ mod tests {
             "groups",
         ];
         assert_eq!(stems(&figures), expected);
+        assert!(
+            figures[0]
+                .caption
+                .contains("4: graded, extrapolated (n = 4)")
+        );
         let bv_tv = super::super::curves::against_bv_tv(&rows).unwrap();
         let Content::Curves(curves) = bv_tv.content else {
             panic!("curves are curves");

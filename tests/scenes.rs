@@ -246,6 +246,18 @@ fn images_and_slices_are_geometries() {
     assert!((last(&out, "min") + 0.5).abs() < 0.01);
 }
 
+/// What the program makes of a scene file, results into `out`.
+fn run_scene(scene: &Path, out: &Path, more: &[&str]) -> std::process::Output {
+    let mut program = bonepd();
+    program
+        .arg("scene")
+        .arg(scene)
+        .arg("-o")
+        .arg(out)
+        .args(more);
+    program.output().unwrap()
+}
+
 /// Runs a scene text in a folder of its own; the exit code, what was said, and the results.
 fn run_text(text: &str) -> (i32, String, tempfile::TempDir) {
     let dir = tempfile::tempdir().unwrap();
@@ -255,13 +267,7 @@ fn run_text(text: &str) -> (i32, String, tempfile::TempDir) {
     grey.save(dir.path().join("pieces.png")).unwrap();
     let scene = dir.path().join("scene.toml");
     std::fs::write(&scene, text).unwrap();
-    let run = bonepd()
-        .arg("scene")
-        .arg(&scene)
-        .arg("-o")
-        .arg(dir.path().join("out"))
-        .output()
-        .unwrap();
+    let run = run_scene(&scene, &dir.path().join("out"), &[]);
     let words = String::from_utf8_lossy(&run.stderr).into_owned();
     (run.status.code().unwrap(), words, dir)
 }

@@ -1,6 +1,6 @@
 //! What scenes read from and leave in folders: differences, folders used twice, dry runs, outlines, slices.
 
-use super::{BODY, bonepd, pipelines};
+use super::{BODY, pipelines, run_scene};
 use bonepd_ct::grid::Grid;
 use bonepd_ct::io::{map, nifti, points};
 use bonepd_ct::stage::scene::{Inputs, Scene};
@@ -20,13 +20,7 @@ fn differences_to_another_scene_are_those_of_the_fields() {
         );
         std::fs::write(&scene, text).unwrap();
         let out = dir.path().join(name);
-        bonepd()
-            .arg("scene")
-            .arg(&scene)
-            .arg("-o")
-            .arg(&out)
-            .output()
-            .unwrap()
+        run_scene(&scene, &out, &[])
     };
     let done = start("local", 6.0, "continuum", "");
     assert!(done.status.success(), "{done:?}");
@@ -95,16 +89,7 @@ fn a_folder_used_again_keeps_nothing_of_the_scene_before() {
              growth = {{ rate = 1.0, stimulus = {stimulus} }}\n"
         );
         std::fs::write(&scene, text).unwrap();
-        let mut program = bonepd();
-        program
-            .arg("scene")
-            .arg(&scene)
-            .arg("-o")
-            .arg(&out)
-            .output()
-            .unwrap()
-            .status
-            .code()
+        run_scene(&scene, &out, &[]).status.code()
     };
     let there = |name: &str| out.join(name).exists();
     assert_eq!(start("every = 1.0", "0.01"), Some(0));
@@ -142,15 +127,7 @@ fn a_dry_run_refuses_what_the_run_refuses() {
         assert!(text.contains(from));
         std::fs::write(&scene, text.replace(from, to)).unwrap();
         let out = dir.path().join("out");
-        let mut program = bonepd();
-        let done = program
-            .arg("scene")
-            .arg(&scene)
-            .arg("-o")
-            .arg(&out)
-            .arg("--dry-run")
-            .output()
-            .unwrap();
+        let done = run_scene(&scene, &out, &["--dry-run"]);
         assert_eq!(done.status.code(), Some(code), "{to}: {done:?}");
         assert!(!out.exists());
     }
@@ -211,13 +188,7 @@ fn slices_that_cannot_be_cells_are_refused() {
              growth = {{ rate = 0.001, stimulus = 0.01 }}\n"
         );
         std::fs::write(&scene, text).unwrap();
-        let done = bonepd()
-            .arg("scene")
-            .arg(&scene)
-            .arg("-o")
-            .arg(dir.path().join("out"))
-            .output()
-            .unwrap();
+        let done = run_scene(&scene, &dir.path().join("out"), &[]);
         let words = String::from_utf8_lossy(&done.stderr).replace('\n', " ");
         assert_eq!(done.status.code(), Some(code), "{words}");
         assert!(words.contains(expected), "{words}");

@@ -1,45 +1,75 @@
-//! Owns a lattice's neighbour lists in about 1.1 bytes a bond: sites in a row have neighbours in rows, so within a block
-//! of consecutive sites the numbers of bond `b`'s ends lie close together, and one byte tells them apart.
+//! Owns a lattice's neighbour lists in five to twenty bytes a site.
+//!
+//! Sites are numbered along rows of the grid, and so are their neighbours in the rows beside. From one site to the next
+//! in its row, the end of a bond therefore moves on by one where the bond exists, and stays where it does not: a site
+//! stores a bit a bond, and only the first site of a stretch the numbers that its bonds begin with.
 
+use crate::topology::stencil::Stencil;
 use rayon::prelude::*;
 use std::ops::{Deref, Range};
 
 /// Bonds of a site at most (SC and FCC).
 pub const MOST: usize = 18;
 
+/// Entries of a decoded row: its bonds, filled up to whole registers.
+pub const LANES: usize = 24;
+
 /// Sites decoded at a time: their table stays in the first-level cache.
 pub const DECODED: usize = 64;
 
-/// Where the inner loops find neighbours: `coordination` entries per site, in [`DECODED`] sites at most.
-pub type Table = [u32; MOST * DECODED];
+/// Where the inner loops find neighbours: a row per site, its bonds first.
+pub type Table = [[u32; LANES]; DECODED];
 
-/// The code of a missing neighbour.
-const MISSING: u8 = u8::MAX;
+/// An empty table.
+pub const EMPTY: Table = [[0; LANES]; DECODED];
 
-/// Sites that one task encodes.
+/// Marks the first site of a stretch in its word.
+const FIRST: u32 = 1 << 31;
+
+/// The bit of every lane's bond.
+const BITS: [u32; LANES] = {
+    let mut bits = [0; LANES];
+    let mut b = 0;
+    while b < MOST {
+        bits[b] = 1 << b;
+        b += 1;
+    }
+    bits
+};
+
+/// Sites that one task encodes; a multiple of [`DECODED`].
 const CHUNK: usize = 8192;
+
+/// Numbers a stretch begins with, at most (FCC has 14).
+const NUMBERS: usize = 16;
 
 /// The neighbours of every site, bond by bond in the stencil's order; a missing one is the site itself.
 #[derive(Debug, Clone)]
 pub struct Neighbours {
     coordination: usize,
-    sites: usize,
-    blocks: Vec<Block>,
-    /// Per site and bond the end's number less the block's base.
-    codes: Vec<u8>,
+    chains: Chains,
+    /// Per site: the bits of its bonds, and whether a stretch begins there.
+    words: Vec<u32>,
+    /// Per stretch a number a chain: what the first of the chain's bonds leads to, or would lead to next.
+    numbers: Vec<u32>,
+    /// The stretch at each [`DECODED`] sites, where one always begins.
+    stretches: Vec<u32>,
 }
 
-/// Sites from `start` to the next block's.
-#[derive(Debug, Clone, Copy)]
-struct Block {
-    start: u32,
-    base: [u32; MOST],
+/// Bonds whose ends lie side by side in one row: where they exist, their numbers follow each other.
+#[derive(Debug, Clone)]
+struct Chains {
+    count: usize,
+    /// Each bond's chain.
+    of: [u8; LANES],
+    /// The bits of the bonds before each in its chain; two at most.
+    before: [[u32; LANES]; 2],
 }
 
 /// The neighbours of one site.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
-    ends: [u32; MOST],
+    ends: [u32; LANES],
     coordination: usize,
 }
 
@@ -50,28 +80,89 @@ impl Deref for Row {
     }
 }
 
+impl Chains {
+    fn new(stencil: &Stencil) -> Self {
+        let lists = stencil.chains();
+        assert!(lists.len() <= NUMBERS && stencil.coordination() <= MOST);
+        let mut chains = Chains {
+            count: lists.len(),
+            of: [0; LANES],
+            before: [[0; LANES]; 2],
+        };
+        for (c, list) in lists.iter().enumerate() {
+            assert!(list.len() <= 3);
+            for (place, &b) in list.iter().enumerate() {
+                chains.of[b] = c as u8;
+                for (before, &earlier) in chains.before.iter_mut().zip(&list[..place]) {
+                    before[b] = BITS[earlier];
+                }
+            }
+        }
+        chains
+    }
+
+    /// How many of the bonds before `b` in its chain a site has.
+    #[inline(always)]
+    fn ahead(&self, b: usize, word: u32) -> u32 {
+        let [one, other] = [self.before[0][b], self.before[1][b]];
+        u32::from(word & one != 0) + u32::from(word & other != 0)
+    }
+
+    /// What each bond leads to, or would lead to next, at the first site of a stretch.
+    #[inline(always)]
+    fn spread(&self, numbers: &[u32], word: u32) -> [u32; LANES] {
+        let mut all = [0; NUMBERS];
+        for (all, &number) in all.iter_mut().zip(numbers) {
+            *all = number;
+        }
+        let mut next = [0; LANES];
+        for b in 0..LANES {
+            next[b] = all[usize::from(self.of[b]) % NUMBERS];
+        }
+        for b in 0..LANES {
+            next[b] += self.ahead(b, word);
+        }
+        next
+    }
+}
+
 impl Neighbours {
-    /// `end(site, bond)` is the site that the bond leads to, if it exists.
-    ///
-    /// # Panics
-    /// If there are more than [`MOST`] bonds a site.
+    /// `follows(site)` is whether the site stands next to the one before it in a row of the grid; `end(site, bond)` is
+    /// the site that the bond leads to, if it exists. Sites are numbered along rows.
     pub fn new(
         sites: usize,
-        coordination: usize,
+        stencil: &Stencil,
+        follows: impl Fn(usize) -> bool + Sync,
         end: impl Fn(usize, usize) -> Option<u32> + Sync,
     ) -> Self {
-        assert!(coordination <= MOST);
-        let mut codes = vec![MISSING; sites * coordination];
-        let blocks: Vec<Vec<Block>> = codes
-            .par_chunks_mut(CHUNK * coordination)
+        let chains = Chains::new(stencil);
+        let z = stencil.coordination();
+        let mut words = vec![0; sites];
+        let parts: Vec<Stretches> = words
+            .par_chunks_mut(CHUNK)
             .enumerate()
-            .map(|(c, codes)| encode(c * CHUNK, coordination, codes, &end))
+            .map(|(c, words)| {
+                let first = c * CHUNK;
+                let starts = |i: usize| i.is_multiple_of(DECODED) || !follows(first + i);
+                encode(&chains, words, starts, |i, row| {
+                    (0..z).for_each(|b| row[b] = end(first + i, b));
+                })
+            })
             .collect();
+        let count = chains.count;
+        let mut numbers = Vec::with_capacity(parts.iter().map(|p| p.numbers.len()).sum());
+        let mut stretches = Vec::with_capacity(sites.div_ceil(DECODED));
+        for part in &parts {
+            let before = (numbers.len() / count) as u32;
+            stretches.extend(part.at.iter().map(|at| before + at));
+            numbers.extend_from_slice(&part.numbers);
+        }
         Neighbours {
-            coordination,
-            sites,
-            blocks: blocks.concat(),
-            codes,
+            coordination: z,
+            chains,
+            words,
+            numbers,
+            stretches,
         }
     }
 
@@ -80,154 +171,230 @@ impl Neighbours {
     }
 
     pub fn len(&self) -> usize {
-        self.sites
+        self.words.len()
     }
 
     pub fn is_empty(&self) -> bool {
-        self.sites == 0
+        self.words.is_empty()
     }
 
     /// Bytes on the heap.
     pub fn bytes(&self) -> usize {
-        self.codes.capacity() + self.blocks.capacity() * size_of::<Block>()
+        4 * (self.words.capacity() + self.numbers.capacity() + self.stretches.capacity())
     }
 
-    fn block_of(&self, site: usize) -> usize {
-        self.blocks.partition_point(|b| b.start as usize <= site) - 1
+    pub fn has(&self, site: usize, bond: usize) -> bool {
+        self.words[site] & BITS[bond] != 0
+    }
+
+    /// Bonds of one site.
+    pub fn bonds(&self, site: usize) -> u32 {
+        (self.words[site] & !FIRST).count_ones()
     }
 
     /// The neighbours of one site. In loops over sites, [`Neighbours::decode`] is cheaper.
     pub fn row(&self, site: usize) -> Row {
-        let (z, base) = (self.coordination, &self.blocks[self.block_of(site)].base);
-        let codes = &self.codes[site * z..(site + 1) * z];
-        let mut ends = [0; MOST];
-        for (b, end) in ends.iter_mut().enumerate().take(z) {
-            *end = decoded(codes[b], base[b], site as u32);
-        }
-        Row {
-            ends,
-            coordination: z,
-        }
+        let mut row = Row {
+            ends: [0; LANES],
+            coordination: self.coordination,
+        };
+        self.decode(site..site + 1, std::slice::from_mut(&mut row.ends));
+        row
     }
 
-    /// Writes the neighbours of `sites`, at most [`DECODED`], to the table's head. Inlined, so that it is compiled for
-    /// the caller's instruction set.
+    /// Calls `visit` with every site and its neighbours. Inlined, as [`Neighbours::decode`].
     #[inline(always)]
-    pub fn decode(&self, sites: Range<usize>, table: &mut Table) {
-        match self.coordination {
-            18 => self.decode_rows::<18>(sites, table),
-            14 => self.decode_rows::<14>(sites, table),
-            z => {
-                for (site, out) in sites.zip(table.chunks_exact_mut(z)) {
-                    out.copy_from_slice(&self.row(site));
-                }
+    pub fn each(&self, sites: Range<usize>, mut visit: impl FnMut(usize, &[u32; LANES])) {
+        let mut table = EMPTY;
+        for start in sites.clone().step_by(DECODED) {
+            let part = start..(start + DECODED).min(sites.end);
+            self.decode(part.clone(), &mut table);
+            for (site, row) in part.zip(&table) {
+                visit(site, row);
             }
         }
     }
 
+    /// Writes the neighbours of `sites` to the head of `rows`, which has a row a site at least. Cheapest from multiples of
+    /// [`DECODED`] on. Inlined, so that it is compiled for the caller's instruction set.
     #[inline(always)]
-    fn decode_rows<const Z: usize>(&self, sites: Range<usize>, table: &mut Table) {
-        assert!(sites.len() <= DECODED && sites.end <= self.sites);
-        let (mut block, mut site) = (self.block_of(sites.start), sites.start);
-        while site < sites.end {
-            let next = self.blocks.get(block + 1);
-            let end = next.map_or(sites.end, |b| sites.end.min(b.start as usize));
-            let base: &[u32; Z] = self.blocks[block].base[..Z].try_into().expect("MOST >= Z");
-            let codes = self.codes[site * Z..end * Z].as_chunks::<Z>().0;
-            let out = &mut table[(site - sites.start) * Z..(end - sites.start) * Z];
-            for (i, (out, codes)) in out.as_chunks_mut::<Z>().0.iter_mut().zip(codes).enumerate() {
-                let own = (site + i) as u32;
-                for b in 0..Z {
-                    out[b] = decoded(codes[b], base[b], own);
-                }
+    pub fn decode(&self, sites: Range<usize>, rows: &mut [[u32; LANES]]) {
+        let block = sites.start / DECODED;
+        let first = block * DECODED;
+        let (skipped, words) = (
+            &self.words[first..sites.start],
+            &self.words[sites.start..sites.end],
+        );
+        let numbers = &self.numbers[self.stretches[block] as usize * self.chains.count..];
+        let mut ends = Ends {
+            chains: &self.chains,
+            numbers,
+            next: [0; LANES],
+        };
+        for &word in skipped {
+            ends.enter(word);
+            ends.leave(word);
+        }
+        for ((site, &word), row) in sites.zip(words).zip(rows) {
+            ends.enter(word);
+            for b in 0..LANES {
+                let there = word & BITS[b] != 0;
+                row[b] = if there { ends.next[b] } else { site as u32 };
             }
-            (block, site) = (block + 1, end);
+            ends.leave(word);
         }
     }
 }
 
-#[inline(always)]
-fn decoded(code: u8, base: u32, site: u32) -> u32 {
-    if code == MISSING {
-        site
-    } else {
-        base + u32::from(code)
+/// Where bonds lead to, while going from site to site.
+struct Ends<'a> {
+    chains: &'a Chains,
+    /// Of the stretches to come.
+    numbers: &'a [u32],
+    next: [u32; LANES],
+}
+
+impl Ends<'_> {
+    #[inline(always)]
+    fn enter(&mut self, word: u32) {
+        if word & FIRST != 0 {
+            let (own, rest) = self.numbers.split_at(self.chains.count);
+            self.next = self.chains.spread(own, word);
+            self.numbers = rest;
+        }
+    }
+
+    #[inline(always)]
+    fn leave(&mut self, word: u32) {
+        for b in 0..LANES {
+            self.next[b] += u32::from(word & BITS[b] != 0);
+        }
     }
 }
 
-/// Codes of the sites from `first` on, and their blocks: as long as each bond's ends lie within a byte of each other.
+/// What a task has encoded.
+struct Stretches {
+    numbers: Vec<u32>,
+    /// The stretch, of the task's own, at each [`DECODED`] sites.
+    at: Vec<u32>,
+}
+
+/// Writes the sites' words. `ends(i, row)` tells the bonds' ends of site `i`.
 fn encode(
-    first: usize,
-    coordination: usize,
-    codes: &mut [u8],
-    end: &(impl Fn(usize, usize) -> Option<u32> + Sync),
-) -> Vec<Block> {
-    let count = codes.len() / coordination;
-    let mut blocks = Vec::new();
+    chains: &Chains,
+    words: &mut [u32],
+    starts: impl Fn(usize) -> bool,
+    ends: impl Fn(usize, &mut [Option<u32>; MOST]),
+) -> Stretches {
+    let (mut numbers, mut at) = (Vec::new(), Vec::new());
     let mut row = [None; MOST];
-    let mut start = 0;
-    while start < count {
-        let (mut low, mut high) = ([u32::MAX; MOST], [0u32; MOST]);
-        let mut stop = start;
-        'grow: while stop < count {
-            for b in 0..coordination {
-                row[b] = end(first + stop, b);
-                if let Some(n) = row[b]
-                    && n.max(high[b]) - n.min(low[b]) >= u32::from(MISSING)
-                {
-                    break 'grow;
-                }
+    // By chain: what its first bond leads to, or would lead to next. Unknown until the stretch has met one of its bonds.
+    let mut next: [Option<u32>; NUMBERS] = [None; NUMBERS];
+    for (i, word) in words.iter_mut().enumerate() {
+        ends(i, &mut row);
+        let bits = (0..MOST).filter(|&b| row[b].is_some());
+        *word = bits.map(|b| BITS[b]).sum();
+        if starts(i) {
+            if i.is_multiple_of(DECODED) {
+                at.push((numbers.len() / chains.count) as u32);
             }
-            for b in 0..coordination {
-                if let Some(n) = row[b] {
-                    (low[b], high[b]) = (low[b].min(n), high[b].max(n));
-                }
-            }
-            stop += 1;
+            next = [None; NUMBERS];
+            numbers.resize(numbers.len() + chains.count, 0);
         }
-        for (site, codes) in
-            (start..stop).zip(codes[start * coordination..].chunks_exact_mut(coordination))
-        {
-            for (b, code) in codes.iter_mut().enumerate() {
-                if let Some(n) = end(first + site, b) {
-                    *code = (n - low[b]) as u8;
-                }
+        let own = numbers.len() - chains.count;
+        for (b, end) in row.iter().enumerate() {
+            let Some(end) = end else { continue };
+            let c = usize::from(chains.of[b]);
+            let first = end - chains.ahead(b, *word);
+            match next[c] {
+                Some(next) => assert_eq!(next, first, "sites are numbered along rows"),
+                // Nothing of the chain was met before: its numbers have not moved since the stretch began.
+                None => (next[c], numbers[own + c]) = (Some(first), first),
             }
         }
-        blocks.push(Block {
-            start: (first + start) as u32,
-            base: low,
-        });
-        start = stop;
+        // The first bond of a chain is the one that is left behind.
+        for b in (0..MOST).filter(|&b| chains.before[0][b] == 0 && row[b].is_some()) {
+            let next = &mut next[usize::from(chains.of[b])];
+            *next = next.map(|n| n + 1);
+        }
+        if starts(i) {
+            *word |= FIRST;
+        }
     }
-    blocks
+    Stretches { numbers, at }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::topology::stencil::Structure;
+    use rand_pcg::Pcg64Mcg;
+    use rand_pcg::rand_core::Rng;
 
-    /// Ends that jump and are missing at times; of both coordinations that have a path of their own, and another.
+    /// Sites of a random mask on a grid, along x, and their numbers on the grid.
+    fn sites(structure: Structure, n: [i32; 3], dense: u32) -> (Vec<[i32; 3]>, Vec<Option<u32>>) {
+        let mut random = Pcg64Mcg::new(u128::from(dense) * 2 + 1);
+        let (mut sites, mut number) = (Vec::new(), Vec::new());
+        for k in 0..n[2] {
+            for j in 0..n[1] {
+                for i in 0..n[0] {
+                    let here = structure.allows([i, j, k]) && random.next_u32() % 100 < dense;
+                    number.push(here.then_some(sites.len() as u32));
+                    if here {
+                        sites.push([i, j, k]);
+                    }
+                }
+            }
+        }
+        (sites, number)
+    }
+
+    /// Every structure, sparse to full, rows longer and shorter than what is decoded at a time.
     #[test]
     fn what_goes_in_comes_out() {
-        for (z, n) in [(18, 20_000usize), (14, 9_000), (6, 3_000), (18, 1)] {
-            let end = |s: usize, b: usize| {
-                let jump =
-                    (s / 700) * 5000 + (s / 13) * (b % 3) + s * (1 + usize::from(b == 5) * 40);
-                (!(s * 31 + b * 17).is_multiple_of(5)).then_some((jump + 100 * b) as u32)
-            };
-            let neighbours = Neighbours::new(n, z, end);
-            let expected = |s: usize, b: usize| end(s, b).unwrap_or(s as u32);
-            for s in (0..n).step_by(7) {
-                let row = neighbours.row(s);
-                assert!((0..z).all(|b| row[b] == expected(s, b)));
-            }
-            let mut table = [0; MOST * DECODED];
-            for start in (0..n).step_by(41) {
-                let sites = start..(start + DECODED).min(n);
-                neighbours.decode(sites.clone(), &mut table);
-                for (i, s) in sites.enumerate() {
-                    assert!((0..z).all(|b| table[i * z + b] == expected(s, b)));
+        for structure in Structure::ALL {
+            for (n, dense) in [
+                ([150, 9, 8], 100),
+                ([150, 9, 8], 90),
+                ([40, 30, 20], 50),
+                ([40, 30, 20], 12),
+                ([3, 40, 50], 60),
+                ([1, 1, 1], 100),
+            ] {
+                let (sites, number) = sites(structure, n, dense);
+                let stencil = structure.stencil();
+                let end = |s: usize, b: usize| {
+                    let at: [i32; 3] =
+                        std::array::from_fn(|a| sites[s][a] + stencil.direction(b)[a]);
+                    let inside = (0..3).all(|a| (0..n[a]).contains(&at[a]));
+                    inside.then(|| number[((at[2] * n[1] + at[1]) * n[0] + at[0]) as usize])?
+                };
+                let step = structure.row_step();
+                let follows = |s: usize| {
+                    let [i, j, k] = sites[s];
+                    s > 0 && sites[s - 1] == [i - step, j, k]
+                };
+                let neighbours = Neighbours::new(sites.len(), &stencil, follows, end);
+                let expected = |s: usize, b: usize| end(s, b).unwrap_or(s as u32);
+                let z = stencil.coordination();
+                for s in (0..sites.len()).step_by(7) {
+                    let row = neighbours.row(s);
+                    assert!(row.len() == z && (0..z).all(|b| row[b] == expected(s, b)));
+                    let bonds = (0..z).filter(|&b| end(s, b).is_some()).count();
+                    assert_eq!(neighbours.bonds(s) as usize, bonds);
+                }
+                for start in (0..sites.len()).step_by(41) {
+                    let range = start..(start + 200).min(sites.len());
+                    let mut met = start;
+                    neighbours.each(range.clone(), |s, row| {
+                        assert_eq!(s, met);
+                        assert!(
+                            (0..z).all(|b| row[b] == expected(s, b)),
+                            "{structure:?} {s}"
+                        );
+                        met += 1;
+                    });
+                    assert_eq!(met, range.end);
                 }
             }
         }

@@ -62,8 +62,12 @@ impl Sites {
             }
         }
         let indices: Vec<[i32; 3]> = kept.iter().map(|&c| frame.indices(c)).collect();
-        let z = stencil.coordination();
-        let neighbours = Neighbours::new(kept.len(), z, |s, b| {
+        let row_step = frame.structure.row_step();
+        let follows = |s: usize| {
+            let [i, j, k] = indices[s];
+            s > 0 && indices[s - 1] == [i - row_step, j, k]
+        };
+        let neighbours = Neighbours::new(kept.len(), &stencil, follows, |s, b| {
             step(&frame, indices[s], stencil.direction(b))
                 .map(|c| number[c])
                 .filter(|&n| n != u32::MAX)
@@ -101,12 +105,8 @@ impl Sites {
 
     /// Bonds, each counted once.
     pub fn bonds(&self) -> usize {
-        let bonded = |s: usize| {
-            let row = self.neighbours_of(s);
-            row.iter().filter(|&&n| n as usize != s).count()
-        };
-        let ends: usize = (0..self.len()).into_par_iter().map(bonded).sum();
-        ends / 2
+        let bonded = |s: usize| self.neighbours.bonds(s) as usize;
+        (0..self.len()).into_par_iter().map(bonded).sum::<usize>() / 2
     }
 
     /// Whether a site has all its bonds; on the loaded faces, all the bonds that stay inside the volume.
@@ -114,10 +114,9 @@ impl Sites {
         let stencil = self.frame.structure.stencil();
         let a = self.frame.axis.index();
         let last = self.frame.planes() as i32 - 1;
-        let row = self.neighbours_of(site);
-        row.iter().enumerate().all(|(b, &n)| {
+        (0..stencil.coordination()).all(|b| {
             let plane = self.plane(site) + stencil.direction(b)[a];
-            plane < 0 || plane > last || n as usize != site
+            plane < 0 || plane > last || self.neighbours.has(site, b)
         })
     }
 

@@ -90,6 +90,11 @@ impl Structure {
         if self == Structure::Sc { 1.0 } else { 2.0 }
     }
 
+    /// Grid steps between places for sites in a row along an axis.
+    pub fn row_step(self) -> i32 {
+        if self == Structure::Sc { 1 } else { 2 }
+    }
+
     /// Whether a site may sit at these grid indices; `(0, 0, 0)` always is a site.
     pub fn allows(self, [i, j, k]: [i32; 3]) -> bool {
         let odd = |v: i32| v & 1;
@@ -125,6 +130,26 @@ impl Stencil {
         2 * self.pairs.len()
     }
 
+    /// Bonds in chains: ends in one row along x with no other place for a site between them, in the order of x.
+    pub fn chains(&self) -> Vec<Vec<usize>> {
+        let mut order: Vec<usize> = (0..self.coordination()).collect();
+        order.sort_by_key(|&b| self.direction(b)[0]);
+        let mut chains: Vec<Vec<usize>> = Vec::new();
+        for b in order {
+            let [_, y, z] = self.direction(b);
+            let beside = |chain: &&mut Vec<usize>| {
+                let [_, other_y, other_z] = self.direction(chain[0]);
+                // In the site's own row, the site stands between.
+                [y, z] != [0, 0] && [y, z] == [other_y, other_z]
+            };
+            match chains.iter_mut().find(beside) {
+                Some(chain) => chain.push(b),
+                None => chains.push(vec![b]),
+            }
+        }
+        chains
+    }
+
     /// Direction of bond `b`: even bonds point along their pair, odd ones against it.
     pub fn direction(&self, b: usize) -> [i32; 3] {
         let sign = if b.is_multiple_of(2) { 1 } else { -1 };
@@ -135,6 +160,27 @@ impl Stencil {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Ends of a chain are as far apart as sites in a row are, and every bond is in one chain.
+    #[test]
+    fn chains_have_no_gaps() {
+        for s in Structure::ALL {
+            let stencil = s.stencil();
+            let chains = stencil.chains();
+            for chain in &chains {
+                for pair in chain.windows(2) {
+                    let [a, b] = [stencil.direction(pair[0]), stencil.direction(pair[1])];
+                    assert_eq!(
+                        [b[0] - a[0], b[1] - a[1], b[2] - a[2]],
+                        [s.row_step(), 0, 0]
+                    );
+                }
+            }
+            let mut all = chains.concat();
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..stencil.coordination()));
+        }
+    }
 
     #[test]
     fn bonds_lead_from_site_to_site_and_have_the_paper_counts() {

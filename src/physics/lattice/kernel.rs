@@ -1,19 +1,57 @@
 //! Owns the lattice's inner loops: what one site gathers from its neighbours.
 
 use super::quad::{Precision, Quad};
-use crate::topology::neighbours::{DECODED, MOST, Neighbours, Table};
+use crate::topology::neighbours::{DECODED, EMPTY, LANES, Neighbours};
 use std::ops::Range;
 
 /// One opposite pair of bonds, scaled for the kernels.
 #[derive(Debug, Clone, Copy)]
 pub struct Pair<S> {
-    pub shell: usize,
-    /// `spring · d dᵀ` by cyclic diagonals: `(d_x d_x, …)`, `(d_x d_y, d_y d_z, d_z d_x)`, `(d_x d_z, …)`.
+    /// `spring · d dᵀ` by cyclic diagonals, in the order of the components they multiply: `(d_x d_x, d_y d_y, d_z d_z)`,
+    /// `(d_z d_x, d_x d_y, d_y d_z)`, `(d_y d_x, d_z d_y, d_x d_z)`.
     pub diagonals: [[S; 4]; 3],
-    /// Whether `d` lies along an axis, so that only the first diagonal is there.
-    pub axial: bool,
     /// `half · d`.
     pub lever: [S; 4],
+}
+
+/// A structure as the loops are compiled for it: its pairs of bonds are known then.
+pub trait Shape {
+    const PAIRS: usize;
+    /// Pairs below it are the first shell.
+    const FIRST_SHELL: usize;
+    /// The first of three pairs along the axes, of which only the first diagonal is there.
+    const AXIAL: usize;
+}
+
+/// A simple cubic lattice.
+pub struct Sc;
+/// A body-centred cubic one.
+pub struct Bcc;
+/// A face-centred cubic one.
+pub struct Fcc;
+
+impl Shape for Sc {
+    const PAIRS: usize = 9;
+    const FIRST_SHELL: usize = 3;
+    const AXIAL: usize = 0;
+}
+
+impl Shape for Bcc {
+    const PAIRS: usize = 7;
+    const FIRST_SHELL: usize = 4;
+    const AXIAL: usize = 4;
+}
+
+impl Shape for Fcc {
+    const PAIRS: usize = 9;
+    const FIRST_SHELL: usize = 6;
+    const AXIAL: usize = 6;
+}
+
+/// The shell of pair `p`.
+#[inline(always)]
+fn shell<H: Shape>(p: usize) -> usize {
+    usize::from(p >= H::FIRST_SHELL)
 }
 
 /// What the loops read. A site has two neighbours a pair; a missing one is the site itself.
@@ -23,60 +61,87 @@ pub struct Bonds<'a, S> {
     pub neighbours: &'a Neighbours,
 }
 
-/// Calls `visit` with every site, its place in the range and its neighbours.
+/// Sites decoded together.
 #[inline(always)]
-fn each_site<S>(
-    bonds: &Bonds<S>,
-    sites: Range<usize>,
-    mut visit: impl FnMut(usize, usize, &[u32]),
-) {
-    let z = 2 * bonds.pairs.len();
-    let mut table: Table = [0; MOST * DECODED];
-    let first = sites.start;
-    for start in sites.clone().step_by(DECODED) {
-        let part = start..(start + DECODED).min(sites.end);
-        bonds.neighbours.decode(part.clone(), &mut table);
-        for (site, row) in part.zip(table.chunks_exact(z)) {
-            visit(site, site - first, row);
+fn decoded(sites: &Range<usize>) -> impl Iterator<Item = Range<usize>> + use<> {
+    let end = sites.end;
+    let starts = sites.clone().step_by(DECODED);
+    starts.map(move |start| start..(start + DECODED).min(end))
+}
+
+/// Both ends of pair `p` in a site's row.
+#[inline(always)]
+fn ends(row: &[u32; LANES], p: usize) -> [u32; 2] {
+    [row[2 * p], row[2 * p + 1]]
+}
+
+/// # Safety
+/// As [`springs`], `j` a site.
+#[inline(always)]
+unsafe fn at<Q: Quad>(u: &[[Q::S; 3]], j: u32) -> Q {
+    unsafe { Q::load(u.as_ptr().add(j as usize).cast()) }
+}
+
+/// What a site is pulled by, diagonal by diagonal: turned to their places only when all of a diagonal is there.
+#[derive(Clone, Copy)]
+struct Pull<Q>([Q; 3]);
+
+impl<Q: Quad> Pull<Q> {
+    #[inline(always)]
+    unsafe fn zero() -> Self {
+        Pull(unsafe { [Q::zero(); 3] })
+    }
+
+    /// Adds `spring · d (d · s)` of pair `p`, with its sign turned.
+    #[inline(always)]
+    unsafe fn add<H: Shape>(&mut self, p: usize, pair: &Pair<Q::S>, s: Q) {
+        let [f, g, h] = &mut self.0;
+        unsafe {
+            *f = f.fma(Q::constant(&pair.diagonals[0]), s);
+            if !(H::AXIAL..H::AXIAL + 3).contains(&p) {
+                *g = g.fma(Q::constant(&pair.diagonals[1]), s);
+                *h = h.fma(Q::constant(&pair.diagonals[2]), s);
+            }
         }
+    }
+
+    #[inline(always)]
+    unsafe fn sum(self) -> Q {
+        let [f, g, h] = self.0;
+        unsafe { f.add(g.turn().add(h.turn_back())) }
     }
 }
 
-/// Adds `spring · d (d · s)`, with its sign turned.
-#[inline(always)]
-unsafe fn pull<Q: Quad>(f: Q, pair: &Pair<Q::S>, s: Q) -> Q {
-    unsafe {
-        let f = f.fma(Q::constant(&pair.diagonals[0]), s);
-        if pair.axial {
-            return f;
-        }
-        let f = f.fma(Q::constant(&pair.diagonals[1]), s.turn());
-        f.fma(Q::constant(&pair.diagonals[2]), s.turn_back())
-    }
-}
+// Loops are written out, not handed to closures: those are not compiled for the instruction set of who calls them.
 
 /// Springs: `y[i − sites.start] = Σ_j ½ k n (n · (u_i − u_j))`, the diagonals carrying the minus sign.
 ///
 /// # Safety
 /// The instruction set of `Q` is available; neighbours are below the number of sites in `u`; `y` has an entry a site.
 #[inline(always)]
-pub unsafe fn springs<Q: Quad>(
+pub unsafe fn springs<H: Shape, Q: Quad>(
     bonds: Bonds<Q::S>,
     sites: Range<usize>,
     u: &[[Q::S; 3]],
     y: &mut [[Q::S; 3]],
 ) {
-    let at = |j: u32| unsafe { Q::load(u.as_ptr().add(j as usize).cast()) };
-    each_site(&bonds, sites, |site, place, row| unsafe {
-        let here = at(site as u32);
-        let mut f = Q::zero();
-        for (pair, ends) in bonds.pairs.iter().zip(row.chunks_exact(2)) {
-            let ahead = at(ends[0]).sub(here);
-            let behind = at(ends[1]).sub(here);
-            f = pull(f, pair, ahead.add(behind));
+    let pairs = &bonds.pairs[..H::PAIRS];
+    let mut table = EMPTY;
+    for part in decoded(&sites) {
+        bonds.neighbours.decode(part.clone(), &mut table);
+        for (site, row) in part.zip(&table) {
+            unsafe {
+                let here = at::<Q>(u, site as u32);
+                let mut pull = Pull::zero();
+                for (p, pair) in pairs.iter().enumerate() {
+                    let [plus, minus] = ends(row, p);
+                    let (ahead, behind) = (at::<Q>(u, plus).sub(here), at::<Q>(u, minus).sub(here));
+                    pull.add::<H>(p, pair, ahead.add(behind));
+                }
+                pull.sum().store(y[site - sites.start].as_mut_ptr());
+            }
         }
-        f.store(y[place].as_mut_ptr());
-    });
+    }
 }
 
 /// Springs of a graded lattice: bond `ij` is worth `½ (w_i + w_j)`. The diagonals carry the half, too.
@@ -84,25 +149,33 @@ pub unsafe fn springs<Q: Quad>(
 /// # Safety
 /// As [`springs`]; `weights` has an entry a site.
 #[inline(always)]
-pub unsafe fn graded_springs<Q: Quad>(
+pub unsafe fn graded_springs<H: Shape, Q: Quad>(
     bonds: Bonds<Q::S>,
     weights: &[Q::S],
     sites: Range<usize>,
     u: &[[Q::S; 3]],
     y: &mut [[Q::S; 3]],
 ) {
-    let at = |j: u32| unsafe { Q::load(u.as_ptr().add(j as usize).cast()) };
-    let share = |j: u32| unsafe { Q::splat(*weights.get_unchecked(j as usize)) };
-    each_site(&bonds, sites, |site, place, row| unsafe {
-        let (here, own) = (at(site as u32), share(site as u32));
-        let mut f = Q::zero();
-        for (pair, ends) in bonds.pairs.iter().zip(row.chunks_exact(2)) {
-            let (plus, minus) = (ends[0], ends[1]);
-            let s = Q::zero().fma(own.add(share(plus)), at(plus).sub(here));
-            f = pull(f, pair, s.fma(own.add(share(minus)), at(minus).sub(here)));
+    let pairs = &bonds.pairs[..H::PAIRS];
+    let mut table = EMPTY;
+    for part in decoded(&sites) {
+        bonds.neighbours.decode(part.clone(), &mut table);
+        for (site, row) in part.zip(&table) {
+            unsafe {
+                let (here, own) = (at::<Q>(u, site as u32), Q::splat(weights[site]));
+                let mut pull = Pull::zero();
+                for (p, pair) in pairs.iter().enumerate() {
+                    let [plus, minus] = ends(row, p);
+                    let share = |j: u32| *weights.get_unchecked(j as usize);
+                    let (w_plus, w_minus) = (Q::splat(share(plus)), Q::splat(share(minus)));
+                    let (ahead, behind) = (at::<Q>(u, plus).sub(here), at::<Q>(u, minus).sub(here));
+                    let s = Q::zero().fma(own.add(w_plus), ahead);
+                    pull.add::<H>(p, pair, s.fma(own.add(w_minus), behind));
+                }
+                pull.sum().store(y[site - sites.start].as_mut_ptr());
+            }
         }
-        f.store(y[place].as_mut_ptr());
-    });
+    }
 }
 
 /// [`springs`] and the volumetric sums `θ_s = Σ_{j∈s} ½ n · (u_j − u_i)` of both shells in one pass over neighbours.
@@ -110,28 +183,42 @@ pub unsafe fn graded_springs<Q: Quad>(
 /// # Safety
 /// As [`springs`]; `theta` has an entry a site.
 #[inline(always)]
-pub unsafe fn springs_and_sums<Q: Quad>(
+pub unsafe fn springs_and_sums<H: Shape, Q: Quad>(
     bonds: Bonds<Q::S>,
     sites: Range<usize>,
     u: &[[Q::S; 3]],
     y: &mut [[Q::S; 3]],
     theta: &mut [[Q::S; 2]],
 ) {
-    let at = |j: u32| unsafe { Q::load(u.as_ptr().add(j as usize).cast()) };
-    each_site(&bonds, sites, |site, place, row| unsafe {
-        let here = at(site as u32);
-        let twice = here.add(here);
-        let mut f = Q::zero();
-        let mut sums = [Q::zero(); 2];
-        for (pair, ends) in bonds.pairs.iter().zip(row.chunks_exact(2)) {
-            let (ahead, behind) = (at(ends[0]), at(ends[1]));
-            f = pull(f, pair, ahead.add(behind).sub(twice));
-            let sum = &mut sums[pair.shell];
-            *sum = sum.fma(Q::constant(&pair.lever), ahead.sub(behind));
+    let pairs = &bonds.pairs[..H::PAIRS];
+    let mut table = EMPTY;
+    for part in decoded(&sites) {
+        bonds.neighbours.decode(part.clone(), &mut table);
+        for (site, row) in part.zip(&table) {
+            unsafe {
+                let here = at::<Q>(u, site as u32);
+                let twice = here.add(here);
+                let mut pull = Pull::zero();
+                let mut sums = [Q::zero(); 2];
+                for (p, pair) in pairs.iter().enumerate() {
+                    let [plus, minus] = ends(row, p);
+                    let (ahead, behind) = (at::<Q>(u, plus), at::<Q>(u, minus));
+                    pull.add::<H>(p, pair, ahead.add(behind).sub(twice));
+                    let stretch = ahead.sub(behind);
+                    sums[shell::<H>(p)] = lengthened(sums[shell::<H>(p)], pair, stretch);
+                }
+                let place = site - sites.start;
+                pull.sum().store(y[place].as_mut_ptr());
+                theta[place] = [sums[0].sum(), sums[1].sum()];
+            }
         }
-        f.store(y[place].as_mut_ptr());
-        theta[place] = [sums[0].sum(), sums[1].sum()];
-    });
+    }
+}
+
+/// A shell's sum with a pair's stretch.
+#[inline(always)]
+unsafe fn lengthened<Q: Quad>(sum: Q, pair: &Pair<Q::S>, stretch: Q) -> Q {
+    unsafe { sum.fma(Q::constant(&pair.lever), stretch) }
 }
 
 /// Volumetric sums alone.
@@ -139,21 +226,31 @@ pub unsafe fn springs_and_sums<Q: Quad>(
 /// # Safety
 /// As [`springs`]; `theta` has an entry a site.
 #[inline(always)]
-pub unsafe fn volumetric_sums<Q: Quad>(
+pub unsafe fn volumetric_sums<H: Shape, Q: Quad>(
     bonds: Bonds<Q::S>,
     sites: Range<usize>,
     u: &[[Q::S; 3]],
     theta: &mut [[Q::S; 2]],
 ) {
-    let at = |j: u32| unsafe { Q::load(u.as_ptr().add(j as usize).cast()) };
-    each_site(&bonds, sites, |_, place, row| unsafe {
-        let mut sums = [Q::zero(); 2];
-        for (pair, ends) in bonds.pairs.iter().zip(row.chunks_exact(2)) {
-            let stretch = at(ends[0]).sub(at(ends[1]));
-            sums[pair.shell] = sums[pair.shell].fma(Q::constant(&pair.lever), stretch);
+    let pairs = &bonds.pairs[..H::PAIRS];
+    let mut table = EMPTY;
+    for part in decoded(&sites) {
+        bonds.neighbours.decode(part.clone(), &mut table);
+        for (site, row) in part.zip(&table) {
+            unsafe {
+                let mut sums = [Q::zero(); 2];
+                for (p, pair) in pairs.iter().enumerate() {
+                    let [plus, minus] = ends(row, p);
+                    sums[shell::<H>(p)] = lengthened(
+                        sums[shell::<H>(p)],
+                        pair,
+                        at::<Q>(u, plus).sub(at::<Q>(u, minus)),
+                    );
+                }
+                theta[site - sites.start] = [sums[0].sum(), sums[1].sum()];
+            }
         }
-        theta[place] = [sums[0].sum(), sums[1].sum()];
-    });
+    }
 }
 
 /// Adds `−Σ_j ½ n (t_i + t_j)` over existing bonds, `t = w T θ`.
@@ -161,7 +258,7 @@ pub unsafe fn volumetric_sums<Q: Quad>(
 /// # Safety
 /// As [`springs`]; `t` has an entry a site.
 #[inline(always)]
-pub unsafe fn volumetric_forces<Q: Quad>(
+pub unsafe fn volumetric_forces<H: Shape, Q: Quad>(
     bonds: Bonds<Q::S>,
     sites: Range<usize>,
     t: &[[Q::S; 2]],
@@ -174,14 +271,23 @@ pub unsafe fn volumetric_forces<Q: Quad>(
         // Selected, not branched on: which neighbours exist follows no pattern.
         std::hint::select_unpredictable(j as usize == site, Q::S::default(), here + there)
     };
-    each_site(&bonds, sites, |site, place, row| unsafe {
-        let here = t[site];
-        let mut f = Q::load(y[place].as_ptr());
-        for (pair, ends) in bonds.pairs.iter().zip(row.chunks_exact(2)) {
-            let s = pair.shell;
-            let pressure = term(here[s], site, ends[1], s) - term(here[s], site, ends[0], s);
-            f = f.fma(Q::constant(&pair.lever), Q::splat(pressure));
+    let pairs = &bonds.pairs[..H::PAIRS];
+    let mut table = EMPTY;
+    for part in decoded(&sites) {
+        bonds.neighbours.decode(part.clone(), &mut table);
+        for (site, row) in part.zip(&table) {
+            unsafe {
+                let here = t[site];
+                let y = &mut y[site - sites.start];
+                let mut f = Q::load(y.as_ptr());
+                for (p, pair) in pairs.iter().enumerate() {
+                    let [plus, minus] = ends(row, p);
+                    let s = shell::<H>(p);
+                    let pressure = term(here[s], site, minus, s) - term(here[s], site, plus, s);
+                    f = f.fma(Q::constant(&pair.lever), Q::splat(pressure));
+                }
+                f.store(y.as_mut_ptr());
+            }
         }
-        f.store(y[place].as_mut_ptr());
-    });
+    }
 }

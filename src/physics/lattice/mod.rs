@@ -45,9 +45,14 @@ fn range(c: usize, len: usize) -> Range<usize> {
 
 /// Lattices whose sites contribute to a stress.
 pub trait Virial: Sync {
-    /// `V_i σ_aa,i` in N mm along the load axis: the derivative of the site's energy by a strain along it. Of a bond, only
-    /// the part between the innermost gripped planes counts.
-    fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> f64;
+    /// `Σ V_i σ_aa,i` in N mm along the load axis, of the sites that count: the derivative of their energy by a strain
+    /// along it. Of a bond, only the part between the innermost gripped planes counts.
+    fn virial<S: Copy + Into<f64>>(
+        &self,
+        u: &[[S; 3]],
+        sites: Range<usize>,
+        counts: impl Fn(usize) -> bool,
+    ) -> f64;
 }
 
 /// The linearised lattice as an operator: `K u` is the gradient of the energy. N and mm.
@@ -116,17 +121,17 @@ impl<'a> Lattice<'a> {
         self.double.volumetric(site)
     }
 
-    /// Every pair with both neighbours along it; a missing one is the site itself.
-    fn bonded(&self, site: usize) -> impl Iterator<Item = (&Pair, usize, usize)> {
-        let row = self.sites.neighbours_of(site);
-        let pairs = self.pairs.iter().enumerate();
-        pairs.map(move |(p, pair)| (pair, row[2 * p] as usize, row[2 * p + 1] as usize))
+    /// Every pair with both neighbours along it, from a row of them; a missing one is the site itself.
+    fn bonded(&self, row: &[u32]) -> impl Iterator<Item = (&Pair, usize, usize)> {
+        let ends = row.as_chunks().0.iter();
+        let pairs = self.pairs.iter().zip(ends);
+        pairs.map(|(pair, &[plus, minus])| (pair, plus as usize, minus as usize))
     }
 
-    /// Volumetric sums `θ_s = Σ_{j∈s} dl_ij` of one site.
-    fn volumetric_sums<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> [f64; 2] {
+    /// Volumetric sums `θ_s = Σ_{j∈s} dl_ij` of the site with these neighbours.
+    fn volumetric_sums<S: Copy + Into<f64>>(&self, u: &[[S; 3]], row: &[u32]) -> [f64; 2] {
         let mut theta = [0.0; 2];
-        for (pair, plus, minus) in self.bonded(site) {
+        for (pair, plus, minus) in self.bonded(row) {
             theta[pair.shell] += pair.half * along(pair.d, u[plus], u[minus]);
         }
         theta
@@ -141,29 +146,47 @@ impl<'a> Lattice<'a> {
 
     /// Energy of one site in N mm, by the formula of the module's head.
     pub fn site_energy(&self, u: &[[f64; 3]], site: usize) -> f64 {
+        let row = self.sites.neighbours_of(site);
         let mut springs = 0.0;
-        for (pair, plus, minus) in self.bonded(site) {
+        for (pair, plus, minus) in self.bonded(&row) {
             for end in [plus, minus] {
                 let dl = pair.half * along(pair.d, u[end], u[site]);
                 springs += self.moduli.k[pair.shell] * dl * dl;
             }
         }
-        let [a, b] = self.volumetric_sums(u, site);
+        let [a, b] = self.volumetric_sums(u, &row);
         0.5 * (self.weight(site) * springs + self.volumetric(site) * (a * a + b * b))
     }
 }
 
 impl Virial for Lattice<'_> {
-    fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> f64 {
+    fn virial<S: Copy + Into<f64>>(
+        &self,
+        u: &[[S; 3]],
+        sites: Range<usize>,
+        counts: impl Fn(usize) -> bool,
+    ) -> f64 {
+        let mut sum = 0.0;
+        self.sites.neighbours.each(sites, |site, row| {
+            if counts(site) {
+                sum += self.site_virial(u, site, row);
+            }
+        });
+        sum
+    }
+}
+
+impl Lattice<'_> {
+    fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize, row: &[u32]) -> f64 {
         let (axis, grips) = (self.sites.frame.axis.index(), self.sites.grips);
         let theta = match self.double.is_volumetric() {
-            true => self.volumetric_sums(u, site),
+            true => self.volumetric_sums(u, row),
             false => [0.0; 2],
         };
         let (w, t) = (self.weight(site), self.volumetric(site));
         let plane = self.sites.plane(site);
         let mut sum = 0.0;
-        for (pair, plus, minus) in self.bonded(site) {
+        for (pair, plus, minus) in self.bonded(row) {
             if pair.d[axis] == 0.0 {
                 continue;
             }
@@ -192,13 +215,11 @@ impl Pair {
         let d = self.d;
         let c = -self.spring * if graded { 0.5 } else { 1.0 };
         let cyclic = |turn: usize| {
-            let [x, y, z] = [0, 1, 2].map(|a| c * d[a] * d[(a + turn) % 3]);
+            let [x, y, z] = [0, 1, 2].map(|a| c * d[a] * d[(a + 3 - turn) % 3]);
             [x, y, z, 0.0]
         };
         kernel::Pair {
-            shell: self.shell,
             diagonals: [cyclic(0), cyclic(1), cyclic(2)],
-            axial: d.iter().filter(|&&c| c != 0.0).count() == 1,
             lever: [self.half * d[0], self.half * d[1], self.half * d[2], 0.0],
         }
     }
@@ -220,9 +241,13 @@ impl Operator<3> for Lattice<'_> {
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
-        d.par_iter_mut()
-            .enumerate()
-            .for_each(|(s, d)| *d = self.site_diagonal(s));
+        d.par_chunks_mut(PORTION).enumerate().for_each(|(c, d)| {
+            let sites = range(c, d.len());
+            let mut d = d.iter_mut();
+            self.sites.neighbours.each(sites, |site, row| {
+                *d.next().expect("a row a site") = self.site_diagonal(site, row);
+            });
+        });
     }
 }
 
@@ -273,10 +298,10 @@ impl Lattice<'_> {
             .expect("no application panics while it holds the room")
     }
 
-    fn site_diagonal(&self, site: usize) -> [f64; 3] {
+    fn site_diagonal(&self, site: usize, row: &[u32]) -> [f64; 3] {
         let w = self.weight(site);
         let (mut d, mut gradient) = ([0.0; 3], [[0.0; 3]; 2]);
-        for (pair, plus, minus) in self.bonded(site) {
+        for (pair, plus, minus) in self.bonded(row) {
             for (end, sign) in [(plus, 1.0), (minus, -1.0)] {
                 if end == site {
                     continue;

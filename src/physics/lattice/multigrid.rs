@@ -6,7 +6,7 @@
 use super::{Lattice, PORTION, range};
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
-use crate::topology::neighbours::{DECODED, MOST};
+use crate::topology::neighbours::MOST;
 use crate::topology::sites::Sites;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -40,13 +40,8 @@ impl<'a> Springs<'a> {
     /// Calls `visit` with every site of the range and its bonds' ends; a missing one is the site itself.
     fn each_ends(&self, sites: Range<usize>, mut visit: impl FnMut(usize, &[u32])) {
         let neighbours = &self.lattice.sites.neighbours;
-        let mut table = [0; MOST * DECODED];
-        for start in sites.clone().step_by(DECODED) {
-            let part = start..(start + DECODED).min(sites.end);
-            neighbours.decode(part.clone(), &mut table);
-            let rows = table.chunks_exact(neighbours.coordination());
-            part.zip(rows).for_each(|(site, ends)| visit(site, ends));
-        }
+        let z = neighbours.coordination();
+        neighbours.each(sites, |site, row| visit(site, &row[..z]));
     }
 }
 

@@ -151,6 +151,18 @@ impl<'a> GradedLattice<'a> {
 }
 
 impl Virial for GradedLattice<'_> {
+    fn virial<S: Copy + Into<f64>>(
+        &self,
+        u: &[[S; 3]],
+        sites: Range<usize>,
+        counts: impl Fn(usize) -> bool,
+    ) -> f64 {
+        let sites = sites.filter(|&s| counts(s));
+        sites.map(|s| self.site_virial(u, s)).sum()
+    }
+}
+
+impl GradedLattice<'_> {
     fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> f64 {
         let (axis, grips) = (self.pieces.frame.axis.index(), self.pieces.grips);
         let plane = self.pieces.indices[site][axis];

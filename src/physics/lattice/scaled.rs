@@ -1,11 +1,12 @@
 //! Owns the lattice's kernels in one precision: what they read, and which instruction set runs them.
 
-use super::kernel::{self, Bonds};
+use super::kernel::{self, Bcc, Bonds, Fcc, Sc, Shape};
 use super::quad::{Precision, Quad};
 use super::{PORTION, range};
 use crate::par::each_chunk;
 use crate::simd::{Isa, isa};
 use crate::topology::sites::Sites;
+use crate::topology::stencil::Structure;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -24,9 +25,7 @@ impl Scaled<f64> {
     pub fn to_single(&self) -> Scaled<f32> {
         let single = |v: [f64; 4]| v.map(|x| x as f32);
         let pair = |p: &kernel::Pair<f64>| kernel::Pair {
-            shell: p.shell,
             diagonals: p.diagonals.map(single),
-            axial: p.axial,
             lever: single(p.lever),
         };
         let by_site = |values: &Option<Vec<f64>>| {
@@ -58,25 +57,10 @@ impl<S: Precision> Scaled<S> {
         }
     }
 
-    fn bonds<'a>(&'a self, sites: &'a Sites) -> Bonds<'a, S> {
-        Bonds {
-            pairs: &self.pairs,
-            neighbours: &sites.neighbours,
-        }
-    }
-
     /// The springs' part of `K u` at `range`.
     pub fn springs(&self, sites: &Sites, range: Range<usize>, u: &[[S; 3]], y: &mut [[S; 3]]) {
         assert!(u.len() == sites.len() && y.len() == range.len());
-        let (bonds, weights) = (self.bonds(sites), self.weights.as_deref());
-        // SAFETY: `isa` vouches for the instruction set, `Sites` for neighbours below its length.
-        unsafe {
-            match isa() {
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => avx2::springs::<S::Fast>(bonds, weights, range, u, y),
-                _ => springs::<S::Plain>(bonds, weights, range, u, y),
-            }
-        }
+        self.perform(sites, range, Task::Springs { u, y });
     }
 
     /// The springs' part of `K u` and `w_i T θ_{s,i}` at `range`.
@@ -89,17 +73,8 @@ impl<S: Precision> Scaled<S> {
         t: &mut [[S; 2]],
     ) {
         assert!(u.len() == sites.len() && y.len() == range.len() && t.len() == range.len());
-        let (bonds, weights, own) = (self.bonds(sites), self.weights.as_deref(), range.clone());
-        // SAFETY: as `springs`.
-        unsafe {
-            match isa() {
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => {
-                    avx2::springs_and_sums::<S::Fast>(bonds, weights, own, u, y, t);
-                }
-                _ => springs_and_sums::<S::Plain>(bonds, weights, own, u, y, t),
-            }
-        }
+        let theta = &mut *t;
+        self.perform(sites, range.clone(), Task::SpringsAndSums { u, y, theta });
         for (site, t) in range.zip(t) {
             let factor = self.volumetric(site);
             *t = t.map(|sum| factor * sum);
@@ -115,15 +90,21 @@ impl<S: Precision> Scaled<S> {
         y: &mut [[S; 3]],
     ) {
         assert!(t.len() == sites.len() && y.len() == range.len());
-        let bonds = self.bonds(sites);
-        // SAFETY: as `springs`.
+        self.perform(sites, range, Task::VolumetricForces { t, y });
+    }
+
+    fn perform(&self, sites: &Sites, range: Range<usize>, task: Task<S>) {
+        let bonds = Bonds {
+            pairs: &self.pairs,
+            neighbours: &sites.neighbours,
+        };
+        let weights = self.weights.as_deref();
+        // SAFETY: `isa` vouches for the instruction set, `Sites` for neighbours below its length, callers for the rest.
         unsafe {
-            match isa() {
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 | Isa::Avx512 => {
-                    avx2::volumetric_forces::<S::Fast>(bonds, range, t, y);
-                }
-                _ => kernel::volumetric_forces::<S::Plain>(bonds, range, t, y),
+            match sites.frame.structure {
+                Structure::Sc => on_this_processor::<Sc, S>(bonds, weights, range, task),
+                Structure::Bcc => on_this_processor::<Bcc, S>(bonds, weights, range, task),
+                Structure::Fcc => on_this_processor::<Fcc, S>(bonds, weights, range, task),
             }
         }
     }
@@ -157,88 +138,103 @@ impl<S: Precision> Scaled<S> {
     }
 }
 
-/// Uniform or graded springs.
-///
+/// What is asked of a range of sites. Displacements and sums are of all sites, the rest of the range.
+enum Task<'t, S> {
+    Springs {
+        u: &'t [[S; 3]],
+        y: &'t mut [[S; 3]],
+    },
+    SpringsAndSums {
+        u: &'t [[S; 3]],
+        y: &'t mut [[S; 3]],
+        theta: &'t mut [[S; 2]],
+    },
+    VolumetricForces {
+        t: &'t [[S; 2]],
+        y: &'t mut [[S; 3]],
+    },
+}
+
 /// # Safety
 /// As [`kernel::springs`].
-#[inline(always)]
-unsafe fn springs<Q: Quad>(
-    bonds: Bonds<Q::S>,
-    weights: Option<&[Q::S]>,
+unsafe fn on_this_processor<H: Shape, S: Precision>(
+    bonds: Bonds<S>,
+    weights: Option<&[S]>,
     sites: Range<usize>,
-    u: &[[Q::S; 3]],
-    y: &mut [[Q::S; 3]],
+    task: Task<S>,
 ) {
     unsafe {
-        match weights {
-            None => kernel::springs::<Q>(bonds, sites, u, y),
-            Some(w) => kernel::graded_springs::<Q>(bonds, w, sites, u, y),
+        match isa() {
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 | Isa::Avx512 => with_avx2::<H, S::Fast>(bonds, weights, sites, task),
+            _ => perform::<H, S::Plain>(bonds, weights, sites, task),
         }
     }
 }
 
-/// The same with volumetric sums.
-///
-/// # Safety
-/// As [`kernel::springs`].
-#[inline(always)]
-unsafe fn springs_and_sums<Q: Quad>(
+/// [`perform`] compiled for AVX2 with fused multiply-add.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn with_avx2<H: Shape, Q: Quad>(
     bonds: Bonds<Q::S>,
     weights: Option<&[Q::S]>,
     sites: Range<usize>,
-    u: &[[Q::S; 3]],
-    y: &mut [[Q::S; 3]],
-    theta: &mut [[Q::S; 2]],
-) {
+    task: Task<Q::S>,
+) where
+    Q::S: Precision,
+{
+    unsafe { perform::<H, Q>(bonds, weights, sites, task) }
+}
+
+/// # Safety
+/// As [`kernel::springs`].
+#[inline(always)]
+unsafe fn perform<H: Shape, Q: Quad>(
+    bonds: Bonds<Q::S>,
+    weights: Option<&[Q::S]>,
+    sites: Range<usize>,
+    task: Task<Q::S>,
+) where
+    Q::S: Precision,
+{
     unsafe {
-        match weights {
-            None => kernel::springs_and_sums::<Q>(bonds, sites, u, y, theta),
-            Some(w) => {
-                kernel::graded_springs::<Q>(bonds, w, sites.clone(), u, y);
-                kernel::volumetric_sums::<Q>(bonds, sites, u, theta);
+        match (task, weights) {
+            (Task::Springs { u, y }, None) => kernel::springs::<H, Q>(bonds, sites, u, y),
+            (Task::Springs { u, y }, Some(w)) => {
+                kernel::graded_springs::<H, Q>(bonds, w, sites, u, y);
+            }
+            (Task::SpringsAndSums { u, y, theta }, None) => {
+                kernel::springs_and_sums::<H, Q>(bonds, sites, u, y, theta);
+            }
+            (Task::SpringsAndSums { u, y, theta }, Some(w)) => {
+                kernel::graded_springs::<H, Q>(bonds, w, sites.clone(), u, y);
+                kernel::volumetric_sums::<H, Q>(bonds, sites, u, theta);
+            }
+            (Task::VolumetricForces { t, y }, _) => {
+                kernel::volumetric_forces::<H, Q>(bonds, sites, t, y);
             }
         }
     }
 }
 
-/// The kernels compiled for AVX2 with fused multiply-add.
-#[cfg(target_arch = "x86_64")]
-mod avx2 {
-    use super::{Bonds, Precision, Quad, kernel};
-    use std::ops::Range;
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn springs<Q: Quad>(
-        bonds: Bonds<Q::S>,
-        weights: Option<&[Q::S]>,
-        sites: Range<usize>,
-        u: &[[Q::S; 3]],
-        y: &mut [[Q::S; 3]],
-    ) {
-        unsafe { super::springs::<Q>(bonds, weights, sites, u, y) }
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn springs_and_sums<Q: Quad>(
-        bonds: Bonds<Q::S>,
-        weights: Option<&[Q::S]>,
-        sites: Range<usize>,
-        u: &[[Q::S; 3]],
-        y: &mut [[Q::S; 3]],
-        theta: &mut [[Q::S; 2]],
-    ) {
-        unsafe { super::springs_and_sums::<Q>(bonds, weights, sites, u, y, theta) }
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    pub unsafe fn volumetric_forces<Q: Quad>(
-        bonds: Bonds<Q::S>,
-        sites: Range<usize>,
-        t: &[[Q::S; 2]],
-        y: &mut [[Q::S; 3]],
-    ) where
-        Q::S: Precision,
-    {
-        unsafe { kernel::volumetric_forces::<Q>(bonds, sites, t, y) }
+    /// What the loops are compiled for is what the stencils say.
+    #[test]
+    fn shapes_are_those_of_the_stencils() {
+        fn agree<H: Shape>(structure: Structure) {
+            let stencil = structure.stencil();
+            assert_eq!(stencil.pairs.len(), H::PAIRS);
+            assert_eq!(stencil.first_shell_pairs, H::FIRST_SHELL);
+            for (p, d) in stencil.pairs.iter().enumerate() {
+                let axial = d.iter().filter(|&&c| c != 0).count() == 1;
+                assert_eq!(axial, (H::AXIAL..H::AXIAL + 3).contains(&p));
+            }
+        }
+        agree::<Sc>(Structure::Sc);
+        agree::<Bcc>(Structure::Bcc);
+        agree::<Fcc>(Structure::Fcc);
     }
 }

@@ -13,11 +13,8 @@ pub struct Stress<'a, M> {
 
 impl<M: Virial> Stress<'_, M> {
     fn sum<S: Copy + Into<f64> + Sync>(&self, u: &[[S; 3]]) -> f64 {
-        let counts = |s: &usize| self.counts.as_ref().is_none_or(|counts| counts[*s]);
-        sum_chunks(u.len(), |sites| {
-            let sites = sites.filter(counts);
-            sites.map(|s| self.model.site_virial(u, s)).sum()
-        })
+        let counts = |s: usize| self.counts.as_ref().is_none_or(|counts| counts[s]);
+        sum_chunks(u.len(), |sites| self.model.virial(u, sites, counts))
     }
 }
 

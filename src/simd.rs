@@ -40,11 +40,19 @@ pub trait Lanes: Copy {
     unsafe fn zero4() -> Self::Four;
     unsafe fn splat(s: Self::S) -> Self;
     unsafe fn load(p: *const Self::S) -> Self;
+    /// The first three of four scalars over and over.
+    unsafe fn load_threes(p: *const Self::S) -> Self;
     unsafe fn store(self, p: *mut Self::S);
     /// `self + a b`.
     unsafe fn fma(self, a: Self, b: Self) -> Self;
-    /// `four + a[0..4] · x`.
-    unsafe fn fma4(four: Self::Four, a: *const Self::S, x: Self::S) -> Self::Four;
+    unsafe fn splat4(s: Self::S) -> Self::Four;
+    /// `four + a[0..4] · (x[0] − less)`.
+    unsafe fn fma4(
+        four: Self::Four,
+        a: *const Self::S,
+        x: *const Self::S,
+        less: Self::Four,
+    ) -> Self::Four;
     unsafe fn sub(self, b: Self) -> Self;
     /// `four + s four_b`.
     unsafe fn scale4(four: Self::Four, s: Self::S, b: Self::Four) -> Self::Four;
@@ -78,6 +86,10 @@ macro_rules! portable {
                 $name(unsafe { p.cast::<[$s; 8]>().read_unaligned() })
             }
             #[inline(always)]
+            unsafe fn load_threes(p: *const $s) -> Self {
+                $name(std::array::from_fn(|l| unsafe { *p.add(l % 3) }))
+            }
+            #[inline(always)]
             unsafe fn store(self, p: *mut $s) {
                 unsafe { p.cast::<[$s; 8]>().write_unaligned(self.0) }
             }
@@ -96,10 +108,19 @@ macro_rules! portable {
                 self
             }
             #[inline(always)]
-            unsafe fn fma4(mut four: [$s; 4], a: *const $s, x: $s) -> [$s; 4] {
-                let a = unsafe { a.cast::<[$s; 4]>().read_unaligned() };
+            unsafe fn splat4(s: $s) -> [$s; 4] {
+                [s; 4]
+            }
+            #[inline(always)]
+            unsafe fn fma4(
+                mut four: [$s; 4],
+                a: *const $s,
+                x: *const $s,
+                less: [$s; 4],
+            ) -> [$s; 4] {
+                let (a, x) = unsafe { (a.cast::<[$s; 4]>().read_unaligned(), *x) };
                 for l in 0..4 {
-                    four[l] += a[l] * x;
+                    four[l] += a[l] * (x - less[l]);
                 }
                 four
             }
@@ -169,6 +190,14 @@ mod x86 {
             unsafe { Avx512F64(_mm512_loadu_pd(p)) }
         }
         #[inline(always)]
+        unsafe fn load_threes(p: *const f64) -> Self {
+            unsafe {
+                let order = _mm512_set_epi64(1, 0, 2, 1, 0, 2, 1, 0);
+                let four = _mm512_castpd256_pd512(_mm256_loadu_pd(p));
+                Avx512F64(_mm512_permutexvar_pd(order, four))
+            }
+        }
+        #[inline(always)]
         unsafe fn store(self, p: *mut f64) {
             unsafe { _mm512_storeu_pd(p, self.0) }
         }
@@ -181,8 +210,15 @@ mod x86 {
             unsafe { Avx512F64(_mm512_sub_pd(self.0, b.0)) }
         }
         #[inline(always)]
-        unsafe fn fma4(four: __m256d, a: *const f64, x: f64) -> __m256d {
-            unsafe { _mm256_fmadd_pd(_mm256_loadu_pd(a), _mm256_set1_pd(x), four) }
+        unsafe fn splat4(s: f64) -> __m256d {
+            unsafe { _mm256_set1_pd(s) }
+        }
+        #[inline(always)]
+        unsafe fn fma4(four: __m256d, a: *const f64, x: *const f64, less: __m256d) -> __m256d {
+            unsafe {
+                let x = _mm256_sub_pd(_mm256_broadcast_sd(&*x), less);
+                _mm256_fmadd_pd(_mm256_loadu_pd(a), x, four)
+            }
         }
         #[inline(always)]
         unsafe fn scale4(four: __m256d, s: f64, b: __m256d) -> __m256d {
@@ -223,6 +259,16 @@ mod x86 {
             unsafe { Avx2F64(_mm256_loadu_pd(p), _mm256_loadu_pd(p.add(4))) }
         }
         #[inline(always)]
+        unsafe fn load_threes(p: *const f64) -> Self {
+            unsafe {
+                let four = _mm256_loadu_pd(p);
+                Avx2F64(
+                    _mm256_permute4x64_pd::<0b00_10_01_00>(four),
+                    _mm256_permute4x64_pd::<0b01_00_10_01>(four),
+                )
+            }
+        }
+        #[inline(always)]
         unsafe fn store(self, p: *mut f64) {
             unsafe {
                 _mm256_storeu_pd(p, self.0);
@@ -241,8 +287,15 @@ mod x86 {
             unsafe { Avx2F64(_mm256_sub_pd(self.0, b.0), _mm256_sub_pd(self.1, b.1)) }
         }
         #[inline(always)]
-        unsafe fn fma4(four: __m256d, a: *const f64, x: f64) -> __m256d {
-            unsafe { _mm256_fmadd_pd(_mm256_loadu_pd(a), _mm256_set1_pd(x), four) }
+        unsafe fn splat4(s: f64) -> __m256d {
+            unsafe { _mm256_set1_pd(s) }
+        }
+        #[inline(always)]
+        unsafe fn fma4(four: __m256d, a: *const f64, x: *const f64, less: __m256d) -> __m256d {
+            unsafe {
+                let x = _mm256_sub_pd(_mm256_broadcast_sd(&*x), less);
+                _mm256_fmadd_pd(_mm256_loadu_pd(a), x, four)
+            }
         }
         #[inline(always)]
         unsafe fn scale4(four: __m256d, s: f64, b: __m256d) -> __m256d {
@@ -281,6 +334,14 @@ mod x86 {
             unsafe { Avx2F32(_mm256_loadu_ps(p)) }
         }
         #[inline(always)]
+        unsafe fn load_threes(p: *const f32) -> Self {
+            unsafe {
+                let order = _mm256_set_epi32(1, 0, 2, 1, 0, 2, 1, 0);
+                let four = _mm256_castps128_ps256(_mm_loadu_ps(p));
+                Avx2F32(_mm256_permutevar8x32_ps(four, order))
+            }
+        }
+        #[inline(always)]
         unsafe fn store(self, p: *mut f32) {
             unsafe { _mm256_storeu_ps(p, self.0) }
         }
@@ -293,8 +354,15 @@ mod x86 {
             unsafe { Avx2F32(_mm256_sub_ps(self.0, b.0)) }
         }
         #[inline(always)]
-        unsafe fn fma4(four: __m128, a: *const f32, x: f32) -> __m128 {
-            unsafe { _mm_fmadd_ps(_mm_loadu_ps(a), _mm_set1_ps(x), four) }
+        unsafe fn splat4(s: f32) -> __m128 {
+            unsafe { _mm_set1_ps(s) }
+        }
+        #[inline(always)]
+        unsafe fn fma4(four: __m128, a: *const f32, x: *const f32, less: __m128) -> __m128 {
+            unsafe {
+                let x = _mm_sub_ps(_mm_broadcast_ss(&*x), less);
+                _mm_fmadd_ps(_mm_loadu_ps(a), x, four)
+            }
         }
         #[inline(always)]
         unsafe fn scale4(four: __m128, s: f32, b: __m128) -> __m128 {

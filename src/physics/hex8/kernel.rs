@@ -79,13 +79,21 @@ fn gather<L: Lanes>(
         let own = segment.nodes();
         let around = &mesh.around[own.clone()];
         let out = &mut y[own.start - nodes.start..own.end - nodes.start];
-        for (i, (&around, out)) in around.iter().zip(out).enumerate() {
-            *out = if around == 0 {
-                [L::S::default(); 3]
-            } else {
-                // SAFETY: the mesh numbers nodes such that a row's base is never the first or the last number.
-                unsafe { node::<L>(table.stencil(around), &segment.rows, i, x) }
-            };
+        let mut i = 0;
+        while i < around.len() {
+            let stencil = table.stencil(around[i]);
+            // SAFETY: the mesh numbers nodes such that a row's base is never the first or the last number.
+            unsafe {
+                if around[i] == 0 {
+                    out[i] = [L::S::default(); 3];
+                } else if around.get(i + 1) == Some(&around[i]) {
+                    [out[i], out[i + 1]] = two_nodes::<L>(stencil, &segment.rows, i, x);
+                    i += 1;
+                } else {
+                    out[i] = node::<L>(stencil, &segment.rows, i, x);
+                }
+            }
+            i += 1;
         }
     }
 }
@@ -93,12 +101,12 @@ fn gather<L: Lanes>(
 /// Node `i`'s own displacement, three times over but for the last component, and that.
 ///
 /// # Safety
-/// `rows[4] + i < x.len()`.
+/// `rows[4] + i < x.len() − 1`.
 #[inline(always)]
-unsafe fn own<L: Lanes>(rows: &[u32; 9], i: usize, x: &[[L::S; 3]]) -> (L, L::S) {
+unsafe fn own<L: Lanes>(rows: &[u32; 9], i: usize, x: &[[L::S; 3]]) -> (L, L::Four) {
     unsafe {
-        let [a, b, c] = *x.get_unchecked(rows[4] as usize + i);
-        (L::load([a, b, c, a, b, c, a, b].as_ptr()), c)
+        let own = x.as_ptr().add(rows[4] as usize + i).cast::<L::S>();
+        (L::load_threes(own), L::splat4(*own.add(2)))
     }
 }
 
@@ -124,10 +132,51 @@ pub unsafe fn node<L: Lanes>(
             four = L::fma4(
                 four,
                 stencil.as_ptr().add(NINTH + 4 * r),
-                *first.add(8) - last,
+                first.add(8),
+                last,
             );
         }
         L::sum3(a, b, c, four)
+    }
+}
+
+/// Nodes `i` and `i + 1`, whose stencils are the same: it is read once.
+///
+/// # Safety
+/// `1 <= rows[r] + i < x.len() − 2` for every row.
+#[inline(always)]
+unsafe fn two_nodes<L: Lanes>(
+    stencil: &[L::S; STRIDE],
+    rows: &[u32; 9],
+    i: usize,
+    x: &[[L::S; 3]],
+) -> [[L::S; 3]; 2] {
+    unsafe {
+        let (here_0, last_0) = own::<L>(rows, i, x);
+        let (here_1, last_1) = own::<L>(rows, i + 1, x);
+        let (mut a_0, mut b_0, mut c_0, mut four_0) = (L::zero(), L::zero(), L::zero(), L::zero4());
+        let (mut a_1, mut b_1, mut c_1, mut four_1) = (a_0, b_0, c_0, four_0);
+        for (r, &base) in rows.iter().enumerate() {
+            let first = x.as_ptr().add(base as usize + i - 1).cast::<L::S>();
+            let (u_0, u_1) = (
+                L::load(first).sub(here_0),
+                L::load(first.add(3)).sub(here_1),
+            );
+            let k = stencil.as_ptr().add(24 * r);
+            let ninth = stencil.as_ptr().add(NINTH + 4 * r);
+            let k_a = L::load(k);
+            (a_0, a_1) = (a_0.fma(k_a, u_0), a_1.fma(k_a, u_1));
+            let k_b = L::load(k.add(8));
+            (b_0, b_1) = (b_0.fma(k_b, u_0), b_1.fma(k_b, u_1));
+            let k_c = L::load(k.add(16));
+            (c_0, c_1) = (c_0.fma(k_c, u_0), c_1.fma(k_c, u_1));
+            four_0 = L::fma4(four_0, ninth, first.add(8), last_0);
+            four_1 = L::fma4(four_1, ninth, first.add(11), last_1);
+        }
+        [
+            L::sum3(a_0, b_0, c_0, four_0),
+            L::sum3(a_1, b_1, c_1, four_1),
+        ]
     }
 }
 
@@ -300,7 +349,7 @@ unsafe fn graded_node<L: Lanes<S: From<f32> + Mul<Output = L::S>>>(
                 p = p.fma(L::load(m), u);
                 q = q.fma(L::load(m.add(8)), u);
                 s = s.fma(L::load(m.add(16)), u);
-                t = L::fma4(t, stencil.as_ptr().add(NINTH + 4 * r), *first.add(8) - last);
+                t = L::fma4(t, stencil.as_ptr().add(NINTH + 4 * r), first.add(8), last);
             }
             let f = L::S::from(factor);
             let wide = L::splat(f);

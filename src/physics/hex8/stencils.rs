@@ -11,28 +11,30 @@ pub const STRIDE: usize = 256;
 /// Where the ninth columns begin.
 pub const NINTH: usize = 216;
 
+/// One stencil, on cache lines of its own: registers are read whole from one line.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+struct Aligned<S>([S; STRIDE]);
+
 /// All 256 stencils.
 #[derive(Debug, Clone)]
 pub struct Stencils<S> {
-    table: Vec<S>,
+    table: Vec<Aligned<S>>,
 }
 
 impl<S: Copy> Stencils<S> {
     #[inline(always)]
     pub fn stencil(&self, around: u8) -> &[S; STRIDE] {
-        let start = around as usize * STRIDE;
-        self.table[start..start + STRIDE]
-            .try_into()
-            .expect("a stencil has STRIDE scalars")
+        &self.table[around as usize].0
     }
 }
 
 impl Stencils<f64> {
     pub fn new(k: &ElementMatrix) -> Self {
-        let mut table = vec![0.0; 256 * STRIDE];
-        for (around, stencil) in table.chunks_exact_mut(STRIDE).enumerate() {
+        let mut table = vec![Aligned([0.0; STRIDE]); 256];
+        for (around, stencil) in table.iter_mut().enumerate() {
             for element in (0..8).filter(|e| around >> e & 1 == 1) {
-                add_element(stencil, element, k);
+                add_element(&mut stencil.0, element, k);
             }
         }
         Stencils { table }
@@ -41,13 +43,18 @@ impl Stencils<f64> {
     /// What rounding left where elements' contributions cancel becomes zero: products with it would fall below what single
     /// precision holds in full, and such take a hundred times as long.
     pub fn to_f32(&self) -> Stencils<f32> {
-        let largest = self.table.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        let single = |&v: &f64| match v.abs() > 1e-12 * largest {
+        let all = self.table.iter().flat_map(|stencil| stencil.0);
+        let largest = all.fold(0.0, |m: f64, v| m.max(v.abs()));
+        let single = |v: f64| match v.abs() > 1e-12 * largest {
             true => v as f32,
             false => 0.0,
         };
         Stencils {
-            table: self.table.iter().map(single).collect(),
+            table: self
+                .table
+                .iter()
+                .map(|s| Aligned(s.0.map(single)))
+                .collect(),
         }
     }
 

@@ -128,18 +128,23 @@ pub fn build_of(
     grip_mm: f64,
 ) -> Result<Sites> {
     let (frame, grips) = lay(specimen, case, axis, grip_mm)?;
-    let mut weights = weigh(&frame, &specimen.bone, case.boundary);
+    let weights = weights(specimen, tissue, case, &frame);
+    Ok(Sites::connect(frame, weights, grips))
+}
+
+/// Of every candidate of a frame.
+fn weights(specimen: &Specimen, tissue: Option<&[f32]>, case: &Case, frame: &Frame) -> Vec<f32> {
+    let mut weights = weigh(frame, &specimen.bone, case.boundary);
     if let Some(tissue) = tissue {
-        stiffen(&frame, &specimen.bone, tissue, &mut weights);
+        stiffen(frame, &specimen.bone, tissue, &mut weights);
     }
-    Ok(Sites::connect(frame, &weights, grips))
+    weights
 }
 
 /// What each site of a lattice takes of `tissue`, a value per voxel, times its weight: as its springs are made by [`build_of`].
 pub fn values_of(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sites) -> Vec<f64> {
-    let (frame, bone) = (&sites.frame, &specimen.bone);
-    let mut weights = weigh(frame, bone, case.boundary);
-    stiffen(frame, bone, tissue, &mut weights);
+    let frame = &sites.frame;
+    let weights = weights(specimen, Some(tissue), case, frame);
     let value = |at: &[i32; 3]| frame.candidate(*at).map_or(0.0, |c| f64::from(weights[c]));
     sites.indices.iter().map(value).collect()
 }

@@ -4,6 +4,7 @@ pub mod dissection;
 pub mod family;
 pub mod layers;
 pub mod loaded;
+pub mod marks;
 pub mod neighbours;
 pub mod outline;
 pub mod pieces;

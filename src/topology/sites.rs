@@ -1,5 +1,6 @@
 //! Owns the lattice of one specimen: its sites, their neighbours, its grips, and what was dropped.
 
+use crate::topology::marks::{Marks, Numbered};
 use crate::topology::neighbours::{Neighbours, Row};
 use crate::topology::placement::Frame;
 use crate::topology::stencil::Stencil;
@@ -49,38 +50,31 @@ impl Grips {
 
 impl Sites {
     /// Builds the lattice from the candidates' weights, keeping what has a path of bonds to both grips.
-    pub fn connect(frame: Frame, weights: &[f32], grips: Grips) -> Self {
+    pub fn connect(frame: Frame, weights: Vec<f32>, grips: Grips) -> Self {
         let stencil = frame.structure.stencil();
-        let carrying = load_carrying(&frame, weights, &stencil, grips);
+        let kept = Numbered::from(load_carrying(&frame, &weights, &stencil, grips));
         let existing = weights.iter().filter(|&&w| w > 0.0).count();
-        let mut number = vec![u32::MAX; frame.candidates()];
-        let mut kept = Vec::new();
-        for c in 0..frame.candidates() {
-            if carrying[c] {
-                number[c] = kept.len() as u32;
-                kept.push(c);
-            }
-        }
-        let indices: Vec<[i32; 3]> = kept.iter().map(|&c| frame.indices(c)).collect();
+        let graded = weights.iter().any(|&w| w > 0.0 && w != 1.0);
+        let own = |c: usize| f64::from(weights[c]);
+        let own: Option<Vec<f64>> = graded.then(|| kept.iter().map(own).collect());
+        // A frame has many more candidates than sites, above all where structure is thin: none of it is kept for long.
+        drop(weights);
+        let mut indices = Vec::with_capacity(kept.len());
+        indices.extend(kept.iter().map(|c| frame.indices(c)));
         let row_step = frame.structure.row_step();
         let follows = |s: usize| {
             let [i, j, k] = indices[s];
             s > 0 && indices[s - 1] == [i - row_step, j, k]
         };
         let neighbours = Neighbours::new(kept.len(), &stencil, follows, |s, b| {
-            step(&frame, indices[s], stencil.direction(b))
-                .map(|c| number[c])
-                .filter(|&n| n != u32::MAX)
+            kept.number(step(&frame, indices[s], stencil.direction(b))?)
         });
-        drop(number);
-        let graded = weights.iter().any(|&w| w > 0.0 && w != 1.0);
-        let weights = graded.then(|| kept.iter().map(|&c| f64::from(weights[c])).collect());
         Sites {
             frame,
             dropped: existing - kept.len(),
             indices,
             neighbours,
-            weights,
+            weights: own,
             grips,
         }
     }
@@ -137,13 +131,14 @@ fn step(frame: &Frame, at: [i32; 3], direction: [i32; 3]) -> Option<usize> {
 }
 
 /// Candidates with a path of bonds to both grips.
-fn load_carrying(frame: &Frame, weights: &[f32], stencil: &Stencil, grips: Grips) -> Vec<bool> {
+fn load_carrying(frame: &Frame, weights: &[f32], stencil: &Stencil, grips: Grips) -> Marks {
     let a = frame.axis.index();
-    let (low, high) = rayon::join(
+    let (mut low, high) = rayon::join(
         || reached(frame, weights, stencil, |at| at[a] <= grips.low),
         || reached(frame, weights, stencil, |at| at[a] >= grips.high),
     );
-    low.into_iter().zip(high).map(|(l, h)| l && h).collect()
+    low.keep(&high);
+    low
 }
 
 /// Candidates with a path of bonds to a seed.
@@ -152,22 +147,21 @@ fn reached(
     weights: &[f32],
     stencil: &Stencil,
     seed: impl Fn([i32; 3]) -> bool,
-) -> Vec<bool> {
-    let mut seen = vec![false; weights.len()];
+) -> Marks {
+    let mut seen = Marks::none(weights.len());
     let mut queue: Vec<usize> = (0..weights.len())
         .filter(|&c| weights[c] > 0.0 && seed(frame.indices(c)))
         .collect();
     for &c in &queue {
-        seen[c] = true;
+        seen.add(c);
     }
     while let Some(c) = queue.pop() {
         let at = frame.indices(c);
         for b in 0..stencil.coordination() {
             if let Some(n) = step(frame, at, stencil.direction(b))
                 && weights[n] > 0.0
-                && !seen[n]
+                && seen.add(n)
             {
-                seen[n] = true;
                 queue.push(n);
             }
         }

@@ -1,11 +1,13 @@
 //! Heap of whole solves beyond the scan, at its highest: bytes per lattice site and per voxel element.
-//! `cargo bench --bench memory`; `BONEPD_BENCH_VOXELS` sets the edge (default 160: about 1e6 sites and elements).
+//! Beside it what `--dry-run` predicts. `cargo bench --bench memory`; `BONEPD_BENCH_VOXELS` sets the edge (default 160: about
+//! 1e6 sites and elements); words choose cases (`-- plump "sc firm"`).
 
 mod specimen;
 
 use bonepd_ct::stage::lattice::{Boundary, Case, Structure};
 use bonepd_ct::stage::solve::SolveParams;
 use bonepd_ct::stage::solve::lattice::solve_lattice;
+use bonepd_ct::stage::solve::need;
 use bonepd_ct::stage::solve::solved::Solved;
 use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -56,16 +58,26 @@ fn highest<T>(f: impl FnOnce() -> T) -> (T, usize) {
 }
 
 fn main() {
+    let words: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|w| !w.starts_with('-'))
+        .collect();
     let n = specimen::edge(160);
     for (name, wave, solid) in [("plump", 40.0, 0.25), ("thin", 20.0, 0.12)] {
         let bone = specimen::waves(n, wave, solid);
         let params = SolveParams::default();
-        let report = |model: &str, (solved, bytes): (Solved, usize)| {
+        let report = |model: &str, solve: &dyn Fn() -> Solved, predicted: &dyn Fn() -> f64| {
+            let named = format!("{name} {model}");
+            if !words.iter().all(|w| named.contains(w.as_str())) {
+                return;
+            }
+            let (solved, bytes) = highest(solve);
             println!(
-                "{name:<6} {model:<22} {:>9} sites or elements  {:>8.1} MiB  {:>6.1} bytes each  {:>3} iterations",
+                "{name:<6} {model:<22} {:>9} sites or elements  {:>8.1} MiB  {:>6.1} bytes each, predicted {:>6.1}  {:>3} iterations",
                 solved.sites,
                 bytes as f64 / f64::from(1 << 20),
                 bytes as f64 / solved.sites as f64,
+                predicted() / solved.sites as f64,
                 solved.iterations
             );
         };
@@ -73,6 +85,8 @@ fn main() {
             (Structure::Sc, Boundary::Floppy),
             (Structure::Sc, Boundary::Firm),
             (Structure::Bcc, Boundary::Floppy),
+            (Structure::Bcc, Boundary::Firm),
+            (Structure::Fcc, Boundary::Floppy),
             (Structure::Sc, Boundary::Graded),
         ] {
             let lp_mm = match (structure, boundary) {
@@ -86,16 +100,16 @@ fn main() {
                 boundary,
                 registration_mm: [0.0; 3],
             };
-            let solve =
-                || solve_lattice(&bone, &case, &params, |_| ()).expect("a lattice that fits");
             report(
                 &format!("lattice {} {}", structure.name(), boundary.name()),
-                highest(solve),
+                &|| solve_lattice(&bone, &case, &params, |_| ()).expect("a lattice that fits"),
+                &|| need::of_lattice(&bone, &case, &params).expect("a lattice that fits"),
             );
         }
         report(
             "voxel-fe",
-            highest(|| solve_voxels(&bone, &params, |_| ()).expect("a mesh that fits")),
+            &|| solve_voxels(&bone, &params, |_| ()).expect("a mesh that fits"),
+            &|| need::of_voxel_fe(&bone, &params),
         );
     }
 }

@@ -9,6 +9,7 @@ usage: tests/peers/rivals.py [CASE ...]        (default: small; see CASES below 
     lattice=LP       the shared stack (else a phantom) as SC floppy and firm lattices at nu = 1/4: LAMMPS
     protocol         bonepd-ct alone: the paper's eight lattices, the shared stack (else a phantom) from file to report
     full             bonepd-ct alone: the shared stack by voxel FE at full resolution
+    batch            bonepd-ct alone: eight phantoms in one run, one, two and four scans at a time: share of the cores in use
     reference        the shared stack at full resolution, ends free and bonded, to 1e-7: ParOSol (half an hour)
 
 ParOSol is `parosol-py` (PyPI: pip install parosol-py, in the Python that runs this), CalculiX is `ccx` (Debian:
@@ -351,6 +352,24 @@ def full(folder, _):
           f"{float(row['algebraic_error_mpa']):.3f} MPa")
 
 
+def batch(folder, _):
+    scans = []
+    for seed in range(1, 9):
+        scan = folder / f"phantom-{seed}.nii.gz"
+        ours("phantom", "-o", scan, "--size-mm", "3" if seed % 2 else "4", "--spacing-mm", "0.02", "--bvtv", f"{0.1 + 0.03 * seed}",
+             "--seed", seed)
+        scans.append(scan)
+    recipe = (ROOT / "pipelines/paper.toml").read_text()
+    (folder / "recipe.toml").write_text(recipe.replace("grip_mm = 0.6", "grip_mm = 0.0"))
+    print("\nbatch: eight phantoms of 3 and 4 mm, the paper's eight lattices each")
+    one_by_one = [timed("run", folder / "recipe.toml", scan, "-o", folder / f"alone-{scan.stem}") for scan in scans]
+    wall, used = (sum(t) for t in zip(*one_by_one))
+    print(f"  one run each {wall:7.2f} s  {used:7.2f} CPU s  {100 * used / wall / CORES:.0f} % of {CORES} cores", flush=True)
+    for jobs in (1, 2, 4):
+        wall, used = timed("run", folder / "recipe.toml", *scans, "-o", folder / f"jobs-{jobs}", "--jobs", jobs)
+        print(f"  --jobs {jobs}     {wall:7.2f} s  {used:7.2f} CPU s  {100 * used / wall / CORES:.0f} % of {CORES} cores", flush=True)
+
+
 def sliding_ends(mask, h):
     """Supports for ParOSol: both ends held along z only, and three values that keep the body from sliding and turning."""
     from parosol_py.core import BoundaryConditionSet
@@ -396,7 +415,8 @@ def reference(folder, _):
             print(f"  ParOSol   E_app {e:.4f} MPa, {iterations} iterations, {wall:.1f} s, {used:.1f} CPU s", flush=True)
 
 
-CASES = {"reference": reference, "small": small, "thin": thin, "stack": stack, "lattice": lattice, "protocol": protocol, "full": full}
+CASES = {"reference": reference, "small": small, "thin": thin, "stack": stack, "lattice": lattice, "protocol": protocol, "full": full,
+         "batch": batch}
 
 
 def main():

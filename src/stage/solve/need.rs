@@ -2,25 +2,30 @@
 //!
 //! Memory goes with what is kept a node or site (vectors, neighbours, diagonal) and, on voxel elements, with the boxes of
 //! multigrid's aggregates (the assembled levels). The factors are fits to the program's own peaks, within 11 % on ten
-//! voxel meshes of 0.1 to 28 million nodes and on eleven lattices (`reports/performance.md`).
+//! voxel meshes of 0.1 to 28 million nodes and within 15 % on twelve lattices of all kinds (`cargo bench --bench memory`
+//! prints both).
 
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::mask::resample;
+use crate::solve::amg::AmgParams;
 use crate::stage::lattice::{Case, build_of, build_pieces};
 use crate::stage::solve::bricks::LEAST_FRACTION;
 use crate::stage::solve::tissue::Tissue;
 use crate::stage::solve::{Method, SolveParams};
+use crate::topology::sites::Sites;
 use crate::volume::{Specimen, Volume};
 use rayon::prelude::*;
+use std::collections::HashSet;
 
 /// Bytes a node and a box of [`BOX`] nodes; of elements that differ, more a node (a factor and a whole diagonal block).
 const NODE: f64 = 101.0;
 const NODE_BOX: f64 = 1850.0;
 const DIFFERING: f64 = 28.0;
 
-/// Bytes a lattice site, and a site of graded lattices, whose bonds have shares.
-const SITE: f64 = 195.0;
+/// Bytes a lattice site and a box of multigrid's, and a site of graded lattices, whose bonds have shares.
+const SITE: f64 = 115.0;
+const SITE_BOX: f64 = 2500.0;
 const PIECE: f64 = 360.0;
 
 /// Edge of multigrid's boxes in nodes.
@@ -41,7 +46,18 @@ pub fn of_lattice(specimen: &Specimen, case: &Case, params: &SolveParams) -> Res
         Tissue::Mixed(mixed) => Some(&mixed.factor[..]),
     };
     let sites = build_of(specimen, factors, case, params.axis, params.grip_mm)?;
-    Ok(sites.len() as f64 * SITE)
+    Ok(sites.len() as f64 * SITE + boxes(&sites) as f64 * SITE_BOX)
+}
+
+/// Multigrid's boxes that hold sites.
+fn boxes(sites: &Sites) -> usize {
+    let edges = AmgParams::lattice(sites.frame.lp_mm).box_mm;
+    let of = |at: &[i32; 3]| {
+        let x = sites.frame.position_mm(*at);
+        [0, 1, 2].map(|a| (x[a] / edges[a]).floor() as i32)
+    };
+    let held: HashSet<[i32; 3]> = sites.indices.iter().map(of).collect();
+    held.len()
 }
 
 /// The same for voxel elements.

@@ -4,6 +4,9 @@
 //! in its row, the end of a bond therefore moves on by one where the bond exists, and stays where it does not: a site
 //! stores a bit a bond, and only the first site of a stretch the numbers that its bonds begin with.
 
+// Lanes read best by index.
+#![allow(clippy::needless_range_loop)]
+
 use crate::topology::stencil::Stencil;
 use rayon::prelude::*;
 use std::ops::{Deref, Range};

@@ -60,8 +60,8 @@ struct Bond {
 fn bonds(sites: &Sites) -> Vec<Bond> {
     let first_shell = sites.frame.structure.stencil().first_shell_pairs;
     let mut bonds = Vec::with_capacity(sites.bonds());
-    for s in 0..sites.len() {
-        for (p, ends) in sites.neighbours_of(s).chunks_exact(2).enumerate() {
+    sites.each_row(|s, row| {
+        for (p, ends) in row.chunks_exact(2).enumerate() {
             if ends[0] as usize != s {
                 bonds.push(Bond {
                     shell: usize::from(p >= first_shell),
@@ -69,7 +69,7 @@ fn bonds(sites: &Sites) -> Vec<Bond> {
                 });
             }
         }
-    }
+    });
     bonds
 }
 

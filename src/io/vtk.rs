@@ -12,14 +12,13 @@ use std::path::Path;
 /// A lattice as points (sites, mm) and lines (bonds), with each site's number of bonds and weight.
 pub fn write_lattice(path: &Path, sites: &Sites) -> Result<()> {
     let mut bonds = Vec::with_capacity(sites.bonds());
-    for s in 0..sites.len() {
-        let row = sites.neighbours_of(s);
+    sites.each_row(|s, row| {
         let ends = row.iter().step_by(2);
         bonds.extend(
             ends.filter(|&&end| end as usize != s)
                 .map(|&end| [s as u32, end]),
         );
-    }
+    });
     let weights: Vec<f32> = match &sites.weights {
         Some(weights) => weights.iter().map(|&w| w as f32).collect(),
         None => vec![1.0; sites.len()],

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::io::extent;
 use crate::recipe::Recipe;
 use crate::run::{adaptive, host};
-use crate::stage::lattice::{Case, LatticeParams};
+use crate::stage::lattice::{Boundary, Case, LatticeParams};
 use crate::stage::solve::{Method, SolveParams, need};
 use crate::volume::Specimen;
 use serde::Serialize;
@@ -22,7 +22,11 @@ const BYTES_PER_TURNED_VOXEL: f64 = 17.0;
 /// Bytes per lattice site and per hexahedron, before the bone is known.
 const BYTES_PER_SITE: f64 = 260.0;
 /// Per place at which a site could be, while they are chosen.
-const BYTES_PER_PLACE: f64 = 5.0;
+const BYTES_PER_PLACE: f64 = 4.5;
+/// The least and the most that a lattice site takes (solid bone; sheets one site thick), and one that is not solved.
+const LEAST_PER_SITE: f64 = 115.0;
+const MOST_PER_SITE: f64 = 430.0;
+const BUILT_PER_SITE: f64 = 40.0;
 const BYTES_PER_ELEMENT: f64 = 220.0;
 
 /// Share of candidate sites that a padded lattice of trabecular bone fills: 120 096 of 274 625 measured at LP 0.06 mm.
@@ -126,15 +130,15 @@ pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Re
         Some(target) => adaptive::expected(&specimen.bone, target, &recipe.solve),
         None => recipe.solve.clone(),
     };
-    let voxels = specimen.bone.grid.len() as f64;
-    let reading = first
-        .voxels
-        .map_or(voxels, |n| n.iter().map(|v| *v as f64).product());
+    let kept = kept_bytes(specimen, params);
+    let reading = first.voxels.map_or(specimen.bone.grid.len() as f64, |n| {
+        n.iter().map(|v| *v as f64).product()
+    });
     let mut bytes = reading * reading_bytes(recipe);
     let mut no_bone = true;
     for case in cases(&recipe.lattice, params) {
-        let needed = need::of(specimen, case.as_ref(), params)?;
-        bytes = bytes.max(voxels + needed);
+        let needed = needed(specimen, case.as_ref(), params)?;
+        bytes = bytes.max(kept + needed);
         no_bone &= needed == 0.0;
     }
     let time_s = match params.method {
@@ -163,6 +167,65 @@ fn cases(lattices: &LatticeParams, params: &SolveParams) -> Vec<Option<Case>> {
     }
 }
 
+/// Bytes that a lattice takes at the least and at the most, told without building it.
+fn bounds(specimen: &Specimen, case: &Case) -> [f64; 2] {
+    let step = case.lp_mm / case.structure.steps_per_lp();
+    let cell = case.structure.cell_volume() * case.lp_mm.powi(3);
+    let places = specimen.tv_mm3 / step.powi(3) * BYTES_PER_PLACE;
+    let solid = specimen.bv_mm3() / cell;
+    // Where little of a place's cell, or only its neighbours', must be bone, any place can be a site.
+    let most = match case.boundary {
+        Boundary::Floppy => 1.2 * solid,
+        Boundary::Firm | Boundary::Graded => specimen.tv_mm3 / cell,
+    };
+    [
+        places.max(LEAST_PER_SITE * solid),
+        places + MOST_PER_SITE * most,
+    ]
+}
+
+/// Bytes of a solve: counted, unless it takes more than is free in any case.
+fn needed(specimen: &Specimen, case: Option<&Case>, params: &SolveParams) -> Result<f64> {
+    let least = case.map_or(0.0, |case| bounds(specimen, case)[0]);
+    match host::available_mib() {
+        Some(free) if mib(least) > free => Ok(least),
+        _ => need::of(specimen, case, params),
+    }
+}
+
+/// MiB that the program takes while it solves this.
+///
+/// # Errors
+/// Settings that do not fit the specimen.
+pub fn of_solve_mib(specimen: &Specimen, case: Option<&Case>, params: &SolveParams) -> Result<f64> {
+    let kept = kept_bytes(specimen, params);
+    Ok(mib(BASE + kept + needed(specimen, case, params)?))
+}
+
+/// Bytes of a specimen: its mask and, where moduli follow grey values, those and each voxel's modulus.
+fn kept_bytes(specimen: &Specimen, params: &SolveParams) -> f64 {
+    let by_voxel = if params.material.is_some() { 9.0 } else { 1.0 };
+    specimen.bone.grid.len() as f64 * by_voxel
+}
+
+/// Refuses a lattice, to be built but not solved, that this machine has no memory for.
+///
+/// # Errors
+/// A lattice that needs more than is free.
+pub fn refuse_lattice_that_does_not_fit(specimen: &Specimen, case: &Case) -> Result<()> {
+    let [least, _] = bounds(specimen, case);
+    let needed = mib(least * BUILT_PER_SITE / LEAST_PER_SITE);
+    match host::available_mib() {
+        Some(free) if needed > free => Err(does_not_fit(
+            "lattice",
+            needed,
+            free,
+            coarser(case, needed / free),
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Refuses a solve that this machine has no memory for, and says what it has memory for.
 ///
 /// # Errors
@@ -175,29 +238,21 @@ pub fn refuse_what_does_not_fit(
     let Some(free) = host::available_mib() else {
         return Ok(());
     };
-    let rough = mib(match case {
-        Some(case) => {
-            let cell = case.structure.cell_volume() * case.lp_mm.powi(3);
-            // Every place is looked at, where bone is one is a site.
-            specimen.tv_mm3 / cell * BYTES_PER_PLACE + specimen.bv_mm3() / cell * BYTES_PER_SITE
-        }
+    let most = match case {
+        Some(case) => bounds(specimen, case)[1],
         None => elements(specimen, params) * BYTES_PER_ELEMENT,
-    });
-    // Counting takes time, and room on lattices, so it is left out where there is no question.
-    let needed = match rough / free {
-        r if r < 0.2 => return Ok(()),
-        r if r > 10.0 => rough,
-        _ => mib(need::of(specimen, case, params)?),
     };
+    // Counting takes time, and room on lattices, so it is left out where there is no question.
+    if mib(most) < 0.5 * free {
+        return Ok(());
+    }
+    let needed = mib(needed(specimen, case, params)?);
     if needed < free {
         return Ok(());
     }
     let factor = needed / free;
     let advice = match case {
-        Some(case) => format!(
-            "crop the scan, or take a lattice parameter of {:.3} mm or more",
-            case.lp_mm * (1.1 * factor).cbrt()
-        ),
+        Some(case) => coarser(case, factor),
         None if params.refine > 1 => {
             let fits = (params.refine as f64 / (1.1 * factor).cbrt())
                 .floor()
@@ -209,10 +264,22 @@ pub fn refuse_what_does_not_fit(
             (params.coarsen as f64 * (1.1 * factor).cbrt()).ceil()
         ),
     };
-    Err(Error::specimen(
-        format!("this solve needs about {needed:.0} MiB, {free:.0} MiB are free"),
-        advice,
-    ))
+    Err(does_not_fit("solve", needed, free, advice))
+}
+
+fn does_not_fit(what: &str, needed: f64, free: f64, advice: String) -> Error {
+    let needs = format!("this {what} needs about {needed:.0} MiB, {free:.0} MiB are free");
+    Error::specimen(needs, advice)
+}
+
+/// What to do about a lattice that takes `factor` times the memory there is.
+fn coarser(case: &Case, factor: f64) -> String {
+    let fits = case.lp_mm * (1.1 * factor).cbrt();
+    // To two digits, upwards: what is advised must fit.
+    let digit = 10f64.powi(fits.log10().floor() as i32 - 1);
+    let fits = (fits / digit).ceil() * digit;
+    let places = (-digit.log10().round()).max(0.0) as usize;
+    format!("crop the scan, or take a lattice parameter of {fits:.places$} mm or more")
 }
 
 fn mib(bytes: f64) -> f64 {

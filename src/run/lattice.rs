@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::grid::Axis;
 use crate::io::{atomic, lammps, specimen, vtk};
+use crate::run::estimate::refuse_lattice_that_does_not_fit;
 use crate::run::segment::load;
 use crate::run::session::Session;
 use crate::stage::lattice::{
@@ -90,6 +91,7 @@ pub fn lattice(
     }
     let mut lattices = Vec::new();
     for case in params.cases() {
+        refuse_lattice_that_does_not_fit(&specimen, &case)?;
         let summary = if case.in_pieces() {
             let pieces = build_pieces(&specimen, &case, Axis::Z, 0.0)?;
             written.pieces(&case, &pieces)?;

@@ -64,8 +64,9 @@ pub fn solve(
         {
             Some(row) => row,
             None if session.dry_run => {
+                let mib = estimate::of_solve_mib(&specimen, job.case(), params)?;
                 session.say(format!(
-                    "would solve {} {} mm",
+                    "would solve {} {} mm, about {mib:.0} MiB",
                     job.name(&blank),
                     blank.lp_mm
                 ));

@@ -35,6 +35,19 @@ impl Boundary {
 /// Cells with less bone than this carry no graded site (lem spec §5).
 const LEAST_FRACTION: f64 = 0.02;
 
+/// Places for sites that 32-bit numbers can count.
+const MOST_PLACES: f64 = u32::MAX as f64;
+
+fn too_many(lp_mm: f64) -> Error {
+    Error::setting(
+        "lp",
+        format!(
+            "a lattice parameter of {lp_mm} mm has more than {MOST_PLACES} places for sites in this specimen, which 32-bit numbers cannot count"
+        ),
+        "give a larger lattice parameter, or crop the scan",
+    )
+}
+
 /// Positions of candidate sites: a grid of spacing `step_mm` centred in the volume. Along the load axis the outermost
 /// planes lie on (or within half a step of) the faces; sideways each site owns a whole cell.
 #[derive(Debug, Clone)]
@@ -55,7 +68,7 @@ impl Frame {
     /// Lays candidates of `structure` over `grid`.
     ///
     /// # Errors
-    /// A lattice parameter that is not positive or leaves fewer than two planes or no site sideways.
+    /// A lattice parameter that is not positive, leaves fewer than two planes or no site sideways, or has too many places.
     pub fn new(
         grid: &Grid,
         structure: Structure,
@@ -83,7 +96,11 @@ impl Frame {
         for a in 0..3 {
             let length = grid.size_mm()[a];
             // User spacings hit exact multiples: 1e-9 keeps rounding from losing a plane.
-            let whole = (length / step_mm + 1e-9).floor() as usize;
+            let whole = (length / step_mm + 1e-9).floor();
+            if whole > f64::from(i32::MAX) / 2.0 {
+                return Err(too_many(lp_mm));
+            }
+            let whole = whole as usize;
             let loaded = a == axis.index();
             let proper = whole + usize::from(loaded);
             let least = if loaded { 2 } else { 1 };
@@ -100,6 +117,9 @@ impl Frame {
             first_mm[a] = 0.5 * (length - (proper - 1) as f64 * step_mm) + registration_mm[a];
             rings[a] = if loaded { 0 } else { ring };
             n[a] = proper + 2 * rings[a];
+        }
+        if n.iter().map(|&n| n as f64).product::<f64>() > MOST_PLACES {
+            return Err(too_many(lp_mm));
         }
         Ok(Frame {
             structure,

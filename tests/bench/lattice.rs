@@ -139,7 +139,7 @@ fn roofline(name: &str, bone: &Specimen) {
     let limits = Limits::measure();
     println!(
         "\n{name}: triad {:.1} GB/s, fused multiply-add {:.0} GFLOP/s (f64)",
-        limits.triad, limits.fma_f64
+        limits.triad, limits.fma_f64_256
     );
     let sites = build(bone, &case(), Axis::Z, 0.0).expect("a lattice that fits");
     let n = sites.len() as f64;

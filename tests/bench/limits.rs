@@ -9,17 +9,22 @@ use std::time::Instant;
 pub struct Limits {
     /// `a = b + s c` from memory, GB/s without write-allocates.
     pub triad: f64,
-    /// Fused multiply-adds, GFLOP/s.
+    /// Fused multiply-adds on the widest registers there are, GFLOP/s; single precision has twice the lanes of double.
     pub fma_f64: f64,
     pub fma_f32: f64,
+    /// The same on 256 bits.
+    pub fma_f64_256: f64,
 }
 
 impl Limits {
     pub fn measure() -> Self {
+        let fma_f64_256 = fma(chains, FLOPS_PER_ROUND);
+        let fma_f64 = widest().map_or(fma_f64_256, |chains| fma(chains, 2 * FLOPS_PER_ROUND));
         Limits {
             triad: triad(),
-            fma_f64: fma(),
-            fma_f32: 2.0 * fma(),
+            fma_f64,
+            fma_f32: 2.0 * fma_f64,
+            fma_f64_256,
         }
     }
 
@@ -67,14 +72,14 @@ fn triad() -> f64 {
     (3 * 8 * N) as f64 / time * 1e-9
 }
 
-/// GFLOP/s in double precision; single has twice the lanes.
-fn fma() -> f64 {
+/// GFLOP/s of chains in double precision.
+fn fma(chains: fn(usize) -> f64, flops: usize) -> f64 {
     const ROUNDS: usize = 20_000_000;
     let threads = rayon::current_num_threads();
     let time = median_s(|| {
         rayon::broadcast(|_| black_box(chains(ROUNDS)));
     });
-    (threads * ROUNDS * FLOPS_PER_ROUND) as f64 / time * 1e-9
+    (threads * ROUNDS * flops) as f64 / time * 1e-9
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -87,6 +92,35 @@ fn chains(rounds: usize) -> f64 {
     assert!(is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"));
     // SAFETY: asked for above.
     unsafe { chains_avx2(rounds) }
+}
+
+/// Chains on 512 bits, where the processor has them.
+#[cfg(target_arch = "x86_64")]
+fn widest() -> Option<fn(usize) -> f64> {
+    // SAFETY: asked for here.
+    is_x86_feature_detected!("avx512f").then_some(|rounds| unsafe { chains_avx512(rounds) })
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn widest() -> Option<fn(usize) -> f64> {
+    None
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn chains_avx512(rounds: usize) -> f64 {
+    use std::arch::x86_64::*;
+    let (x, y) = (
+        _mm512_set1_pd(black_box(0.999_999)),
+        _mm512_set1_pd(black_box(1e-6)),
+    );
+    let mut sums = [_mm512_set1_pd(1.0); 12];
+    for _ in 0..rounds {
+        for sum in &mut sums {
+            *sum = _mm512_fmadd_pd(*sum, x, y);
+        }
+    }
+    sums.iter().map(|s| _mm512_cvtsd_f64(*s)).sum()
 }
 
 /// Twelve independent chains, more than latency × units of any processor yet.

@@ -82,7 +82,8 @@ fn gather<L: Lanes>(
         let mut i = 0;
         while i < around.len() {
             let stencil = table.stencil(around[i]);
-            // SAFETY: the mesh numbers nodes such that a row's base is never the first or the last number.
+            // SAFETY: the mesh numbers nodes such that no node of a segment has the first or the last number in any row; of two
+            // nodes the second is of the same segment.
             unsafe {
                 if around[i] == 0 {
                     out[i] = [L::S::default(); 3];
@@ -97,6 +98,36 @@ fn gather<L: Lanes>(
         }
     }
 }
+
+/// Every set of registers that this processor has, with its name.
+#[cfg(test)]
+pub fn each_way_f64(mut visit: impl FnMut(&str, Rows<f64>)) {
+    visit("plain", gather::<simd::PlainF64>);
+    #[cfg(target_arch = "x86_64")]
+    {
+        // SAFETY: asked for before each.
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            visit("avx2", |m, t, n, x, y| unsafe { avx2_f64(m, t, n, x, y) });
+        }
+        if simd::isa() == Isa::Avx512 {
+            visit("avx512", |m, t, n, x, y| unsafe { avx512(m, t, n, x, y) });
+        }
+    }
+}
+
+/// The same in single precision.
+#[cfg(test)]
+pub fn each_way_f32(mut visit: impl FnMut(&str, Rows<f32>)) {
+    visit("plain", gather::<simd::PlainF32>);
+    #[cfg(target_arch = "x86_64")]
+    if simd::isa() != Isa::Portable {
+        // SAFETY: just asked for.
+        visit("avx2", |m, t, n, x, y| unsafe { avx2_f32(m, t, n, x, y) });
+    }
+}
+
+#[cfg(test)]
+pub type Rows<S> = fn(&VoxelMesh, &Stencils<S>, Range<usize>, &[[S; 3]], &mut [[S; 3]]);
 
 /// Node `i`'s own displacement, three times over but for the last component, and that.
 ///

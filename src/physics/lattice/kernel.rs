@@ -112,7 +112,7 @@ impl<Q: Quad> Pull<Q> {
     }
 }
 
-// Loops are written out, not handed to closures: those are not compiled for the instruction set of who calls them.
+// Loops are written out, not handed to closures: registers in those would not be of the instruction set of who calls them.
 
 /// Springs: `y[i − sites.start] = Σ_j ½ k n (n · (u_i − u_j))`, the diagonals carrying the minus sign.
 ///

@@ -273,9 +273,7 @@ impl MixedPrecision for Lattice<'_> {
         let (sites, double) = (self.sites, &self.double);
         let mut t = self.room();
         t.par_chunks_mut(PORTION).enumerate().for_each(|(c, t)| {
-            let mut springs = [[0.0; 3]; PORTION];
-            let springs = &mut springs[..t.len()];
-            double.springs_and_pressures(sites, range(c, t.len()), x, springs, t);
+            double.pressures(sites, range(c, t.len()), x, t);
         });
         each_chunk(out, PORTION, |first, out| {
             let mut image = [[0.0; 3]; PORTION];

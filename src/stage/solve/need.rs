@@ -12,7 +12,7 @@ use crate::solve::amg::AmgParams;
 use crate::stage::lattice::{Case, build_of, build_pieces};
 use crate::stage::solve::bricks::LEAST_FRACTION;
 use crate::stage::solve::tissue::Tissue;
-use crate::stage::solve::{Method, SolveParams};
+use crate::stage::solve::{Conditions, Load, Method, SolveParams};
 use crate::topology::sites::Sites;
 use crate::volume::{Specimen, Volume};
 use rayon::prelude::*;
@@ -27,6 +27,10 @@ const DIFFERING: f64 = 28.0;
 const SITE: f64 = 115.0;
 const SITE_BOX: f64 = 2500.0;
 const PIECE: f64 = 360.0;
+
+/// Bytes more a site of a factor of its own, in both precisions; and a node, of five fields that a stiffness tensor keeps.
+const WEIGHTED: f64 = 12.0;
+const KEPT_FIELDS: f64 = 60.0;
 
 /// Edge of multigrid's boxes in nodes.
 const BOX: usize = 5;
@@ -46,7 +50,14 @@ pub fn of_lattice(specimen: &Specimen, case: &Case, params: &SolveParams) -> Res
         Tissue::Mixed(mixed) => Some(&mixed.factor[..]),
     };
     let sites = build_of(specimen, factors, case, params.axis, params.grip_mm)?;
-    Ok(sites.len() as f64 * SITE + boxes(&sites) as f64 * SITE_BOX)
+    let mut site = SITE;
+    if sites.weights.is_some() {
+        site += WEIGHTED;
+    }
+    if matches!(&tissue, Tissue::Mixed(mixed) if mixed.poissons.len() > 1) {
+        site += WEIGHTED;
+    }
+    Ok(sites.len() as f64 * site + boxes(&sites) as f64 * SITE_BOX)
 }
 
 /// Multigrid's boxes that hold sites.
@@ -85,7 +96,10 @@ pub fn of_voxel_fe(specimen: &Specimen, params: &SolveParams) -> f64 {
     } else {
         0.0
     };
-    let node = if differing { NODE + DIFFERING } else { NODE };
+    let mut node = if differing { NODE + DIFFERING } else { NODE };
+    if params.load == Load::Stiffness && params.conditions == Conditions::Kinematic {
+        node += KEPT_FIELDS;
+    }
     masks + nodes * node + boxes * NODE_BOX
 }
 

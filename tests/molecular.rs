@@ -1,5 +1,9 @@
 //! Continuum-molecular scenes against closed forms and an independent prototype.
 
+mod costs;
+mod couple_stress;
+mod turned;
+
 use bonepd_ct::error::{Error, Result};
 use bonepd_ct::stage::scene::frame::{Frame, Observer, Summary, Values};
 use bonepd_ct::stage::scene::state::State;
@@ -272,41 +276,6 @@ fn crack_tip_fields_of_a_fully_anisotropic_body() {
     }
 }
 
-/// Crack, material and field turned by a right angle are the same on the grid: displacements turn with them.
-#[test]
-fn a_crack_tip_may_lie_across_the_grid() {
-    let text = |crack: &str, angle: f64| {
-        format!(
-            "title = 'crack tip'
-            [geometry.disc]
-            radius = 1
-            [grid]
-            spacing = 0.05
-            horizon_ratio = 3
-            partial_volumes = true
-            [physics.continuum-molecular]
-            cracks = [[{crack}, 0, 0]]
-            known = [{{ region = {{ outside = [0, 0, 0.825] }}, field = {{ crack-tip = [1, 0.4] }}, angle_deg = {angle} }}]
-            [physics.continuum-molecular.elasticity]
-            moduli = [1, 0.8, 0.2, 0.3333333333333333, 0.1, 0.16666666666666666]
-            angle_deg = {angle}"
-        )
-    };
-    let (_, along) = solved(&text("-2, 0", 0.0));
-    let (_, across) = solved(&text("0, -2", 90.0));
-    let (u, v) = (along.vector("displacement"), across.vector("displacement"));
-    let place = |p: [f64; 2]| [(p[0] * 40.0).round() as i64, (p[1] * 40.0).round() as i64];
-    for (p, u) in along.positions.iter().zip(u) {
-        let turned = place([-p[1], p[0]]);
-        let there = across.positions.iter().position(|q| place(*q) == turned);
-        let v = v[there.unwrap()];
-        assert!(
-            (v[0] + u[1]).abs() < 1e-11 && (v[1] - u[0]).abs() < 1e-11,
-            "{p:?}: {u:?} {v:?}"
-        );
-    }
-}
-
 /// The error falls with the spacing: 4.5007e-3 at a/30, 1.7610e-3 at a/60, of order 1.35 in the mean.
 #[test]
 fn crack_tip_fields_converge() {
@@ -372,59 +341,6 @@ fn linear_temperatures_bend_a_free_body_without_stress() {
             );
         }
     }
-}
-
-/// Largest error of the rotation in a sheared strip with couple stresses, relative to the rotation in its middle.
-/// Locally the energy density is ½ G u'² + ½ c (θ + u'/2)² + ½ E θ'² with c = 4 (3 C1212 - C1111) for isotropy, so
-/// θ = -(τ/2G)(1 - cosh(y/l)/cosh(H/l)), l² = E (G + c/4)/(c G).
-fn couple_stress_error(layer: f64) -> f64 {
-    use bonepd_ct::physics::anisotropic::tensor::{Plane, PlaneTensor};
-    let tensor = PlaneTensor::isotropic(1.0, 0.0, Plane::Stress).unwrap();
-    let (c11, g) = (tensor.c()[0][0], tensor.c()[2][2]);
-    let c = 4.0 * (3.0 * g - c11);
-    let half = 2.0 * layer;
-    let e = layer * layer * c * g / (g + 0.25 * c);
-    let (_, kept) = solved(&format!(
-        "title = 'strip'
-        hold = [{{ region = {{ box = [-1000, -1000, 1000, {low}] }}, component = 'rotation' }},
-                {{ region = {{ box = [-1000, {half}, 1000, 1000] }}, component = 'rotation' }},
-                {{ region = {{ box = [-1000, -1000, 1000, {low}] }}, component = 'x', value = -1 }},
-                {{ region = {{ box = [-1000, {half}, 1000, 1000] }}, component = 'x', value = 1 }},
-                {{ region = 'all', component = 'y' }}]
-        [geometry.rectangle]
-        size = [{}, {}]
-        [grid]
-        spacing = 1
-        horizon_ratio = 3
-        partial_volumes = true
-        [physics.continuum-molecular.elasticity]
-        young = 1
-        poisson = 0
-        calibrated = true
-        bending = {{ first = {e}, second = {e} }}",
-        12.0 * layer,
-        2.0 * half + 6.0,
-        low = -half,
-    ));
-    // u' = (τ - cθ/2)/(G + c/4) and u(half) = 1 give τ from the mean of θ.
-    let mean = 1.0 - layer / half * (half / layer).tanh();
-    let tau = (1.0 / half) * (g + 0.25 * c) / (1.0 + 0.25 * c / g * mean);
-    let theta = |y: f64| -tau / (2.0 * g) * (1.0 - (y / layer).cosh() / (half / layer).cosh());
-    let rotation = kept.scalar("rotation");
-    let middle = (0..rotation.len())
-        .filter(|&i| (kept.positions[i][0] - 0.5).abs() < 0.1 && kept.positions[i][1].abs() < half);
-    let error = |i: usize| (rotation[i] - theta(kept.positions[i][1])).abs();
-    middle.map(error).fold(0.0, f64::max) / theta(0.0).abs()
-}
-
-/// The edges are held over a horizon instead of on a line, so the error is of first order in horizon over layer.
-#[test]
-fn couple_stresses_make_the_local_boundary_layer_of_rotation() {
-    let [coarse, fine] = [5.0, 10.0].map(couple_stress_error);
-    assert!(
-        fine < 0.1 && (coarse / fine).log2() > 0.7,
-        "{coarse} {fine}"
-    );
 }
 
 /// Cooling of an insulated square: a cosine decays as exp(-π²Dt/L²), calibrated stencil, surfaces corrected.
@@ -529,49 +445,10 @@ fn plate_modes_on_a_fine_grid_match_the_published_ones() {
     }
 }
 
-/// Unknowns per point: 1 for conduction, 2 where Cauchy's relations hold (central bonds), 3 with rotations.
-#[test]
-fn a_scene_pays_for_its_physics_alone() {
-    let elastic = |poisson: f64| {
-        format!(
-            "{PLATE}[physics.continuum-molecular.elasticity]\nyoung = 1\npoisson = {poisson}\n[physics.continuum-molecular.vibration]\ndensity = 1\nmodes = 4"
-        )
-    };
-    let (central, _) = solved(&elastic(1.0 / 3.0));
-    let (rotating, _) = solved(&elastic(0.2));
-    assert_eq!(
-        (central.points, central.unknowns, rotating.unknowns),
-        (240, 480, 720)
-    );
-    let (heat, _) = solved(&format!(
-        "hold = [{{ region = {{ edge = 'left' }}, component = 'temperature' }}]
-        {PLATE}
-        [physics.continuum-molecular.conduction]\nconductivity = [1, 1, 0]"
-    ));
-    assert_eq!(heat.unknowns, 240 - 12);
-}
-
-/// A coupled scene solves for 3 unknowns per point and, in a system of its own, 1 more; broken bonds stop conducting, so
-/// that the potential between the crack's lips rises as it grows, and never falls.
+/// Broken bonds stop conducting, so that the potential between the crack's lips rises as it grows, and never falls.
 #[test]
 fn the_potential_drop_rises_with_the_crack() {
-    let wired = "conduction = { conductivity = [2, 1, 0], exponent = 4, probes = [[-14.5, 1.5], [-14.5, -1.5]] }";
-    let (alone, _) = strip("", 0.2);
-    let leads =
-        "load = [{ region = { box = [-15, 8, -13, 10] }, component = 'potential', value = 1 }]
-        hold = [{ region = { edge = 'bottom' }, component = 'y' },
-                { region = { edge = 'bottom' }, component = 'x' },
-                { region = { box = [-15, -10, -13, -8] }, component = 'potential' },";
-    let (coupled, kept) = solved(
-        &strip_text("", 0.2)
-            .replace("cracks =", &format!("{wired}\n        cracks ="))
-            .replace(
-                "hold = [{ region = { edge = 'bottom' }, component = 'y' },
-                { region = { edge = 'bottom' }, component = 'x' },",
-                leads,
-            ),
-    );
-    assert_eq!(alone.unknowns, coupled.unknowns);
+    let (_, kept) = solved(&wired_strip(0.2));
     let (drop, length) = (kept.column("potential_drop"), kept.column("crack_length"));
     assert!(length.last().unwrap() > &5.0, "{length:?}");
     assert!(
@@ -607,6 +484,31 @@ fn senseless_scenes_are_refused_in_words() {
         [physics.continuum-molecular.fracture]\nenergy = [1, 1]"
     ));
     assert!(brittle.contains("time"), "{brittle}");
+    // Physics that nothing would use.
+    let elastic = format!("{PLATE}[physics.continuum-molecular.elasticity]\nyoung = 1\n");
+    let [heat, modes, breaks] = [
+        "conduction]\nconductivity = [1, 1, 0]\n",
+        "vibration]\ndensity = 1\nmodes = 1\n",
+        "fracture]\nenergy = [1, 1]\n",
+    ]
+    .map(|table| format!("[physics.continuum-molecular.{table}"));
+    let apart = refused(&format!("{elastic}{heat}"));
+    assert!(apart.contains("do not act on each other"), "{apart}");
+    let both = refused(&format!("{elastic}{modes}{breaks}"));
+    assert!(both.contains("both fracture and vibration"), "{both}");
+    let alone = refused(&format!("{PLATE}{heat}{breaks}"));
+    assert!(alone.contains("without elasticity"), "{alone}");
+}
+
+/// The strip with a current between the ends of its left edge, and the potential read across the slit's mouth.
+fn wired_strip(end: f64) -> String {
+    let wired = "conduction = { conductivity = [2, 1, 0], exponent = 4, probes = [[-14.5, 1.5], [-14.5, -1.5]] }";
+    let leads =
+        "load = [{ region = { box = [-15, 8, -13, 10] }, component = 'potential', value = 1 }]
+        hold = [{ region = { box = [-15, -10, -13, -8] }, component = 'potential' },";
+    strip_text("", end)
+        .replace("cracks =", &format!("{wired}\n        cracks ="))
+        .replace("hold = [", leads)
 }
 
 fn strip(extra: &str, end: f64) -> (Summary, Kept) {

@@ -22,6 +22,8 @@ RUNS, OUT = map(pathlib.Path, sys.argv[1:3])
 HUES = ["#0072B2", "#D55E00", "#000000", "#009E73"]
 DASHES = ["-", "--", ":", "-."]
 MARKS = ["o", "s", "D", "^"]
+# Folders of turns.sh, and what they are called.
+KINDS = [("turn", "mean over 8 grids, a/40")]
 plt.rcParams.update({"font.family": "DejaVu Sans", "font.size": 9, "axes.grid": True, "grid.color": "#cccccc"})
 
 
@@ -116,31 +118,65 @@ def slopes():
             print(f"compact tension, {z} degrees, {near} to {near + 3} mm: inclined by {angle:.1f} degrees")
 
 
+# Of maximum hoop stress and of the largest energy release rate, for mixities of 0, 10, ... 90 degrees, by kinks.py.
+HOOP = {
+    "silicon": [0, -18.9, -33.1, -42.6, -49.3, -54.4, -58.6, -62.2, -65.6, -68.9],
+    "anisotropic": [0, -19.7, -33.8, -43.8, -51.1, -56.8, -61.4, -65.5, -69.2, -72.7],
+}
+ENERGY = {
+    "silicon": HOOP["silicon"],
+    "anisotropic": [9.5, -10.5, -28.3, -41.2, -50.2, -56.9, -62.0, -66.1, -69.5, -72.5],
+}
+TURNS = ["0", "11.25", "22.5", "33.75", "45.001", "56.25", "67.5", "78.75"]
+
+
+def kinks_on_grids(material, kind):
+    """Kinks (rows: turns of the grid, columns: mixities) relative to the crack, or None where a run is missing."""
+    rows = []
+    for turn in TURNS:
+        path = RUNS / f"crack-kinking-{material}-{kind}-{turn}" / "scene.json"
+        if not path.exists():
+            print(f"left out: {path} is missing")
+            return None
+        numbers = dict(json.load(open(path))["numbers"])
+        rows.append([numbers[f"end_direction_deg_at_{m}"] - float(turn) for m in range(0, 91, 10)])
+    return rows
+
+
+def deviation(found, criterion):
+    return sum(abs(f - c) for f, c in zip(found, criterion)) / len(criterion)
+
+
 def kinking():
-    """Criteria of maximum hoop stress, as the report's text prints them for 0, 10, ... 90 degrees."""
-    criterion = {
-        "silicon": [0, -18.9, -33.1, -42.6, -49.3, -54.4, -58.6, -62.2, -65.6, -68.9],
-        "anisotropic": [0, -19.7, -33.8, -43.8, -51.1, -56.8, -61.4, -65.5, -69.2, -72.7],
-    }
-    # Largest energy release rate, by kinks.py.
-    energy = {
-        "silicon": criterion["silicon"],
-        "anisotropic": [9.5, -10.5, -28.3, -41.2, -50.2, -56.9, -62.0, -66.1, -69.5, -72.5],
-    }
-    figure, axes = plt.subplots(1, 2, figsize=(7.4, 3.2), sharey=True)
-    for axis, (material, angles) in zip(axes, criterion.items()):
-        axis.plot(range(0, 91, 10), [-a for a in angles], color=HUES[2], lw=1, label="maximum hoop stress")
-        axis.plot(range(0, 91, 10), [-a for a in energy[material]], "--", color=HUES[3], lw=1, label="maximum energy release")
-        for k, (grid, folder) in enumerate((("a/60", ""), ("a/40", "-40"))):
-            path = RUNS / f"crack-kinking-{material}{folder}" / "scene.json"
-            if not path.exists():
-                print(f"left out: {path} is missing")
+    """Kinks on eight grids beside the two criteria: each grid as a dot, their mean with its scatter as a bar."""
+    figure, axes = plt.subplots(1, 2, figsize=(7.4, 3.4), sharey=True)
+    mixities = list(range(0, 91, 10))
+    for axis, material in zip(axes, HOOP):
+        axis.plot(mixities, [-a for a in HOOP[material]], color=HUES[2], lw=1, label="maximum hoop stress")
+        axis.plot(mixities, [-a for a in ENERGY[material]], "--", color=HUES[3], lw=1, label="maximum energy release")
+        for k, (kind, label) in enumerate(KINDS):
+            rows = kinks_on_grids(material, kind)
+            if rows is None:
                 continue
-            numbers = dict(json.load(open(path))["numbers"])
-            found = {float(key.split("_at_")[1]): -v for key, v in numbers.items() if key.startswith("end_direction_deg")}
-            axis.plot(found.keys(), found.values(), MARKS[k], color=HUES[k], ms=5, label=f"computed, {grid}")
-            rest = [abs(found[a] + angles[int(a / 10)]) for a in found]
-            print(f"{material}, {grid}: mean deviation {sum(rest) / len(rest):.2f} degrees, largest {max(rest):.2f}")
+            for turn, row in zip(TURNS, rows):
+                cells = " | ".join(f"{v:.1f}" for v in row)
+                print(f"{material}, {label} | {turn}° | {cells} | {deviation(row, HOOP[material]):.1f} | "
+                      f"{deviation(row, ENERGY[material]):.1f} |")
+            columns = list(zip(*rows))
+            mean = [sum(c) / len(c) for c in columns]
+            scatter = [math.sqrt(sum((v - m) ** 2 for v in c) / (len(c) - 1)) for c, m in zip(columns, mean)]
+            single = [sum(deviation(r, c[material]) for r in rows) / len(rows) for c in (HOOP, ENERGY)]
+            ensemble = [deviation(mean, c[material]) for c in (HOOP, ENERGY)]
+            print(f"{material}, {label} | mean | {' | '.join(f'{v:.1f}' for v in mean)} | {ensemble[0]:.1f} | {ensemble[1]:.1f} |")
+            print(f"{material}, {label} | scatter | {' | '.join(f'{v:.1f}' for v in scatter)} | | |")
+            print(f"{material}, {label}: mean deviation of one grid {single[0]:.2f} (hoop stress), {single[1]:.2f} (energy); of the "
+                  f"mean over grids {ensemble[0]:.2f}, {ensemble[1]:.2f}; largest of the mean "
+                  f"{max(abs(m - c) for m, c in zip(mean, HOOP[material])):.2f}; scatter in the mean {sum(scatter) / 10:.2f}")
+            shifted = [m + 1.5 * (2 * k - len(KINDS) + 1) for m in mixities]
+            axis.errorbar(shifted, [-m for m in mean], scatter, fmt=MARKS[k], color=HUES[k], ms=5, lw=1, capsize=3,
+                          label=label)
+            if k == 0:
+                axis.plot(shifted * len(rows), [-v for row in rows for v in row], ".", color="#999999", ms=3, zorder=0)
         axis.set_title({"silicon": "silicon <100>", "anisotropic": "fully anisotropic"}[material], fontsize=9)
         axis.set_xlabel("mixity (degrees)")
     axes[0].set_ylabel("kink (degrees)")

@@ -7,14 +7,15 @@ pub mod equilibrium;
 pub mod fracture;
 pub mod modes;
 pub mod setup;
+pub mod solid;
 pub mod steady;
 pub mod sweep;
+mod tensors;
+mod unused;
 pub mod window;
 
 use crate::error::{Error, Result};
-use crate::physics::anisotropic::conductivity::Conductivity;
 use crate::physics::anisotropic::tensor::{Plane, PlaneTensor};
-use crate::physics::anisotropic::tetrachiral::Tetrachiral;
 use crate::stage::scene::conditions::Region;
 use crate::stage::scene::frame::{Observer, Summary};
 use crate::stage::scene::{Inputs, Scene};
@@ -143,6 +144,9 @@ pub struct Fracture {
     pub exponent: u32,
     #[serde(default = "first")]
     pub frequency: u32,
+    /// Give each direction of the stencil the share of its sector in the fracture energy of straight lines.
+    #[serde(default)]
+    pub calibrated: bool,
     /// Bonds break in extension only.
     #[serde(default = "yes")]
     pub extension_only: bool,
@@ -212,59 +216,6 @@ fn window() -> usize {
     800
 }
 
-impl Elasticity {
-    /// The stiffness in the scene's axes.
-    pub fn tensor(&self, inputs: &Inputs) -> Result<PlaneTensor> {
-        let zeta = self.angle_deg.to_radians();
-        let tensor = match (&self.moduli, self.young, &self.tetrachiral, &self.from_scan) {
-            (Some(moduli), None, None, None) => PlaneTensor::from_moduli(*moduli)?,
-            (None, Some(young), None, None) => {
-                PlaneTensor::isotropic(young, self.poisson.unwrap_or(0.0), self.plane)?
-            }
-            (None, None, Some(t), None) => t.lattice().tensor()?,
-            (None, None, None, Some(scan)) => {
-                let six = inputs.stiffness.as_ref().ok_or_else(|| {
-                    Error::setting(
-                        "elasticity.from_scan.file",
-                        "the stiffness was not read",
-                        "check its path",
-                    )
-                })?;
-                PlaneTensor::cut(six, scan.axes.map(|a| a.index()), self.plane)?
-            }
-            _ => {
-                return Err(Error::setting(
-                    "elasticity",
-                    "expected exactly one of moduli, young (with poisson), tetrachiral, from_scan",
-                    "keep one",
-                ));
-            }
-        };
-        Ok(tensor.turned(zeta))
-    }
-}
-
-impl TetrachiralParams {
-    fn lattice(&self) -> Tetrachiral {
-        Tetrachiral {
-            block_mm: self.block,
-            chirality: self.chirality_deg.to_radians(),
-            interface_mm: self.interface,
-            young_mpa: self.young,
-            poisson: self.poisson,
-        }
-    }
-}
-
-impl Conduction {
-    /// The conductivity in the scene's axes.
-    pub fn tensor(&self) -> Result<Conductivity> {
-        let [k11, k22, k12] = self.conductivity;
-        let (major, minor, axis) = Conductivity::new(k11, k22, k12)?.axes();
-        Conductivity::principal(major, minor, axis + self.angle_deg.to_radians())
-    }
-}
-
 /// Runs a continuum-molecular scene.
 pub fn run(
     scene: &Scene,
@@ -275,6 +226,7 @@ pub fn run(
     if let Some(sweep) = &model.sweep {
         return sweep::run(scene, model, sweep, inputs, observer);
     }
+    unused::refuse(model)?;
     let setup = setup::Setup::new(scene, model, inputs)?;
     let Some(elasticity) = &model.elasticity else {
         let Some(conduction) = &model.conduction else {
@@ -311,7 +263,7 @@ fn elastic<const D: usize>(
     setup: &setup::Setup,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    let solid = setup::Solid::<D>::new(scene, model, elasticity, tensor, setup)?;
+    let solid = solid::Solid::<D>::new(scene, model, elasticity, tensor, setup)?;
     match (&model.vibration, &model.fracture) {
         (Some(vibration), _) => modes::run(solid, vibration, setup, observer),
         (None, Some(fracture)) => fracture::run(scene, model, fracture, solid, setup, observer),

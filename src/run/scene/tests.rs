@@ -44,6 +44,12 @@ impl Observer for Stopping<'_> {
 
 /// Runs a scene in `out`, up to `left` steps. Whether it finished, and whether it went on from a state.
 fn attempt(text: &str, out: &Path, left: usize) -> (bool, bool) {
+    let (summary, resumed) = summarised(text, out, left);
+    (summary.is_some(), resumed)
+}
+
+/// The same with the summary of a scene that finished.
+fn summarised(text: &str, out: &Path, left: usize) -> (Option<Summary>, bool) {
     let scene = Scene::parse(text, Path::new("scene.toml")).unwrap();
     let (inputs, session) = (
         Inputs::default(),
@@ -60,8 +66,8 @@ fn attempt(text: &str, out: &Path, left: usize) -> (bool, bool) {
         left,
         resumed: false,
     };
-    let done = run(&scene, &inputs, &mut stopping).is_ok();
-    if done {
+    let done = run(&scene, &inputs, &mut stopping).ok();
+    if done.is_some() {
         stopping.inner.finish().unwrap();
         stopping.inner.forget().unwrap();
     }
@@ -134,4 +140,30 @@ fn a_stopped_scene_of_bonds_goes_on_to_the_same_end() {
 fn a_stopped_scene_of_elements_goes_on_to_the_same_end() {
     let model = "[physics.continuum]\nyoung = 1.0\ndensity_at = 'gauss'";
     assert_the_same_after_a_stop(model, "step = 0.01\ntolerance = 1e-4");
+}
+
+/// A sweep stopped in the middle of its values does only the rest, and ends with the same summary and files.
+#[test]
+fn a_stopped_sweep_keeps_its_finished_values() {
+    let text = "title = 'angles'
+         geometry.rectangle.size = [8, 8]
+         [grid]
+         spacing = 1.0
+         horizon_ratio = 3
+         partial_volumes = true
+         [physics.continuum-molecular]
+         known = [{ region = 'all', field = { strain = [1, 0, 0] } }]
+         elasticity = { moduli = [1, 1, 0.2, 0.33, 0.1, 0.2] }
+         sweep = { parameter = 'angle', values = [0, 10, 20, 30, 40, 50, 60, 70] }";
+    let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (uncut, resumed) = summarised(text, whole.path(), 1000);
+    assert!(uncut.is_some() && !resumed);
+    assert_eq!(summarised(text, parts.path(), 5), (None, false));
+    // Three values were kept: five are left, not eight.
+    assert_eq!(summarised(text, parts.path(), 6), (uncut, true));
+    let (whole, parts) = (files(whole.path()), files(parts.path()));
+    assert!(whole.contains_key("fields_t70.csv") && whole.keys().eq(parts.keys()));
+    for (name, bytes) in whole.iter().filter(|(n, _)| !n.ends_with(".svg")) {
+        assert!(parts[name] == *bytes, "{name} differs");
+    }
 }

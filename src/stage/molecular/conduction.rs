@@ -36,7 +36,8 @@ pub fn conduct(
             let (x, unknowns) = solve(&body, &setup.points, &held, &force)?;
             let frame = conducted(model, conduction, setup, &body, &k, &x, t);
             observer.frame(&frame)?;
-            Ok(summary(setup, unknowns, 1, frame.numbers))
+            let stored = body.bond_values();
+            Ok(summary(setup, unknowns, stored, 1, frame.numbers))
         }
     }
 }
@@ -226,24 +227,25 @@ impl Transient {
         Ok(summary(
             setup,
             self.factorised.reduction.unknowns(),
+            self.body.bond_values(),
             steps,
             numbers,
         ))
     }
 }
 
-/// The potential of a body whose broken bonds no longer conduct, per unit thickness.
+/// The potential of a body whose broken bonds no longer conduct, per unit thickness, and the number of its unknowns.
 pub fn potential(
     scene: &Scene,
     model: &Molecular,
     setup: &Setup,
     body: &Body<1>,
-) -> Result<Vec<f64>> {
+) -> Result<(Vec<f64>, usize)> {
     let held = setup.held(scene, model, CONDUCTED, 1.0, None)?;
     let force = loads(scene, model, setup, CONDUCTED, 1.0)?;
     let mut factorised = factorise(body, &setup.points, &held, &[], &[])?;
     let mut q = right_hand_side(body, &factorised, &held, &force);
     factorised.llt.solve(&mut q);
     let x: Vec<[f64; 1]> = factorised.expand(&q, &held);
-    Ok(x.iter().map(|v| v[0]).collect())
+    Ok((x.iter().map(|v| v[0]).collect(), q.len()))
 }

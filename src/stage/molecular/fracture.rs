@@ -11,7 +11,8 @@ mod start;
 mod watch;
 
 use super::crack::Crack;
-use super::setup::{Setup, Solid};
+use super::setup::Setup;
+use super::solid::Solid;
 use super::window::{Window, WindowBond, opposite};
 use super::{Fracture, Molecular};
 use crate::error::{Error, Result};
@@ -68,6 +69,7 @@ struct Front<'a, const D: usize> {
     windows: usize,
     /// As of the last accepted load.
     potential_drop: f64,
+    potential_unknowns: usize,
 }
 
 /// Events at constant load between looks at the whole body.

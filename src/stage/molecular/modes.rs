@@ -2,7 +2,8 @@
 
 use super::Vibration;
 use super::equilibrium::factorise;
-use super::setup::{Setup, Solid};
+use super::setup::Setup;
+use super::solid::Solid;
 use super::steady::{displacement, scalar, summary};
 use crate::error::{Error, Result};
 use crate::solve::lanczos::{Mode, lowest};
@@ -78,5 +79,6 @@ pub fn run<const D: usize>(
         })?;
         numbers.push((format!("frequency_{}", k + 1), f));
     }
-    Ok(summary(setup, unknowns, found.len(), numbers))
+    let stored = solid.body.bond_values();
+    Ok(summary(setup, unknowns, stored, found.len(), numbers))
 }

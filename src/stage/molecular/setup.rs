@@ -3,9 +3,8 @@
 use super::{Conduction, Elasticity, KnownField, Molecular};
 use crate::error::{Error, Result};
 use crate::physics::anisotropic::body::Body;
-use crate::physics::anisotropic::bond::{Bond, Moduli, bonds};
+use crate::physics::anisotropic::bond::{Bond, bonds};
 use crate::physics::anisotropic::conductivity::calibration;
-use crate::physics::anisotropic::cosine::CosineLaw;
 use crate::physics::anisotropic::crack_tip::CrackTip;
 use crate::physics::anisotropic::micromoduli::Micromoduli;
 use crate::physics::anisotropic::tensor::PlaneTensor;
@@ -88,7 +87,8 @@ impl Setup {
         self.family.len() / 2
     }
 
-    fn finish<const D: usize>(&self, model: &Molecular, mut body: Body<D>) -> Body<D> {
+    /// With the surface correction, where asked for.
+    pub fn finish<const D: usize>(&self, model: &Molecular, mut body: Body<D>) -> Body<D> {
         if model.correct_surfaces {
             body.correct_surfaces(|p| self.layer[p]);
         }
@@ -105,7 +105,7 @@ impl Setup {
         let law = tensor.microconductivity(self.horizon(), conduction.exponent)?;
         let mut k: Vec<f64> = self.bonds.iter().map(|b| law.at(b.psi())).collect();
         if conduction.calibrated {
-            let c = calibration(&self.bonds, &k, &tensor)?;
+            let c = calibration(&self.bonds, &k, tensor.k())?;
             k.iter_mut()
                 .zip(&self.bonds)
                 .for_each(|(k, b)| *k *= b.second_harmonic(c));
@@ -215,7 +215,8 @@ fn known_values<const D: usize>(
     values
 }
 
-/// Whether the bond from `a` to `b` crosses the segment; through its very end it does not.
+/// Whether the bond from `a` to `b` crosses the segment; through its very end it does not. A point on the segment belongs
+/// to its left side.
 fn crosses(segment: &[f64; 4], a: [f64; 2], b: [f64; 2]) -> bool {
     // Shortened by a trifle, so that rounding does not decide on bonds through the ends.
     let at = |share: f64| [0, 1].map(|i| segment[i] + share * (segment[i + 2] - segment[i]));
@@ -223,58 +224,23 @@ fn crosses(segment: &[f64; 4], a: [f64; 2], b: [f64; 2]) -> bool {
     let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
         (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
     };
-    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+    let left = |p: [f64; 2]| side(c, d, p) >= 0.0;
+    side(a, b, c) * side(a, b, d) < 0.0 && left(a) != left(b)
 }
 
-/// An elastic body and what is held of it at time 1 or at the end.
-pub struct Solid<const D: usize> {
-    pub body: Body<D>,
-    /// Of each bond of the stencil.
-    pub moduli: Vec<Moduli>,
-    pub held: Vec<Option<f64>>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-pub const DISPLACEMENT: [&[&str]; 3] = [&["x"], &["y"], &["rotation"]];
-
-impl<const D: usize> Solid<D> {
-    pub fn new(
-        scene: &Scene,
-        model: &Molecular,
-        elasticity: &Elasticity,
-        tensor: &PlaneTensor,
-        setup: &Setup,
-    ) -> Result<Self> {
-        let micro = setup.micromoduli(elasticity, tensor)?;
-        let bending = match &elasticity.bending {
-            Some(b) => {
-                // E = (δ³/6) ∫ k_b n nᵀ dψ, of which eqs. 180, 181 are the case n = 2.
-                let scale = 6.0 / setup.horizon().powi(3);
-                let zeta = elasticity.angle_deg.to_radians();
-                Some(CosineLaw::of_second_moment(
-                    scale * b.first,
-                    scale * b.second,
-                    b.exponent,
-                    zeta,
-                )?)
-            }
-            None => None,
-        };
-        let law = |b: &Bond| Moduli {
-            axial: micro.axial(b.psi()),
-            shear: if D == 2 { 0.0 } else { micro.shear(b.psi()) },
-            bending: bending.as_ref().map_or(0.0, |k| k.at(b.psi())),
-        };
-        let moduli: Vec<Moduli> = setup.bonds.iter().map(law).collect();
-        let blocks = setup
-            .bonds
-            .iter()
-            .zip(&moduli)
-            .map(|(b, k)| b.stiffness(k, setup.cell))
-            .collect();
-        let body = setup.finish(model, Body::new(setup.family.clone(), blocks));
-        let names: [&[&str]; D] = std::array::from_fn(|d| DISPLACEMENT[d]);
-        let t = scene.time.as_ref().map_or(1.0, |time| time.end);
-        let held = setup.held(scene, model, names, t, Some(tensor))?;
-        Ok(Solid { body, moduli, held })
+    /// Points on a crack are cut off from one of its sides only; bonds beside it or through its end stay.
+    #[test]
+    fn a_crack_through_points_parts_its_two_sides() {
+        let crack = [-2.0, -2.0, 1.0, 1.0];
+        let cut = |a, b| crosses(&crack, a, b) && crosses(&crack, b, a);
+        assert!(cut([0.0, 0.0], [1.0, 0.0]) && cut([0.0, 1.0], [1.0, 0.0]));
+        assert!(!crosses(&crack, [0.0, 0.0], [0.0, 1.0]));
+        assert!(!crosses(&crack, [-1.0, -1.0], [0.0, 0.0]));
+        assert!(!crosses(&crack, [1.0, 2.0], [2.0, 1.0]));
+        assert!(!crosses(&crack, [0.0, 2.0], [2.0, 0.0]));
     }
 }

@@ -1,7 +1,8 @@
 //! Owns solutions of elastic bodies without cracks that grow, and what all solutions report.
 
 use super::equilibrium::solve;
-use super::setup::{Setup, Solid};
+use super::setup::Setup;
+use super::solid::Solid;
 use super::{Elasticity, Molecular, Thermal};
 use crate::error::Result;
 use crate::physics::anisotropic::tensor::PlaneTensor;
@@ -86,7 +87,7 @@ pub fn deform<const D: usize>(
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     observer.start(&setup.points, 1)?;
-    let names: [&[&str]; D] = std::array::from_fn(|d| super::setup::DISPLACEMENT[d]);
+    let names: [&[&str]; D] = std::array::from_fn(|d| super::solid::DISPLACEMENT[d]);
     let t = scene.time.as_ref().map_or(1.0, |time| time.end);
     let mut force = loads(scene, model, setup, names, t)?;
     if let Some(thermal) = &elasticity.thermal {
@@ -118,7 +119,8 @@ pub fn deform<const D: usize>(
         numbers: numbers.clone(),
         fields,
     })?;
-    Ok(summary(setup, unknowns, 1, numbers))
+    let stored = solid.body.bond_values();
+    Ok(summary(setup, unknowns, stored, 1, numbers))
 }
 
 /// The strain of a body held at one everywhere.
@@ -181,12 +183,15 @@ pub fn scalar(name: &'static str, values: Vec<f64>) -> Field {
     }
 }
 
+/// `bond_values` says how many values are stored to tell bonds apart.
 pub fn summary(
     setup: &Setup,
     unknowns: usize,
+    bond_values: usize,
     steps: usize,
-    numbers: Vec<(String, f64)>,
+    mut numbers: Vec<(String, f64)>,
 ) -> Summary {
+    numbers.push(("bond_values".into(), bond_values as f64));
     Summary {
         points: setup.points.len(),
         unknowns,

@@ -1,5 +1,7 @@
 //! Owns a scene repeated over the values of one parameter.
 
+mod kept;
+
 use super::{KnownField, Molecular};
 use crate::error::{Error, Result};
 use crate::stage::scene::frame::{Frame, Observer, Summary};
@@ -51,7 +53,8 @@ impl Sweep {
     }
 }
 
-/// Passes nothing on but words and, at the end, the last fields.
+/// Passes nothing on but words and, at the end, the last fields. What is kept of a stopped sweep is its finished values:
+/// the one under way starts anew.
 struct Quiet<'a> {
     inner: &'a mut dyn Observer,
     last: Frame,
@@ -87,11 +90,23 @@ pub fn run(
         ));
     }
     observer.start(&scene.points(inputs)?, sweep.values.len())?;
-    let mut total = Summary {
-        converged: true,
-        ..Summary::default()
+    let (mut total, mut finished) = match observer.resume()? {
+        Some(state) => kept::restore(&state)?,
+        None => (
+            Summary {
+                converged: true,
+                ..Summary::default()
+            },
+            0,
+        ),
     };
-    for &value in &sweep.values {
+    if finished > 0 {
+        observer.say(&format!(
+            "goes on after {finished} of {} values",
+            sweep.values.len()
+        ));
+    }
+    for &value in &sweep.values[finished.min(sweep.values.len())..] {
         let mut quiet = Quiet {
             inner: observer,
             last: Frame::default(),
@@ -110,6 +125,8 @@ pub fn run(
         for (name, number) in one.numbers {
             total.numbers.push((format!("{name}_at_{value}"), number));
         }
+        finished += 1;
+        observer.keep(&|| kept::state(&total, finished))?;
     }
     Ok(total)
 }

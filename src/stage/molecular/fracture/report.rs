@@ -2,6 +2,7 @@
 
 use super::{Front, Ledger};
 use crate::error::Result;
+use crate::physics::anisotropic::body::Body;
 use crate::stage::molecular::conduction::{drop, potential};
 use crate::stage::molecular::steady::{displacement, scalar, summary};
 use crate::stage::scene::frame::{Frame, Observer, Summary};
@@ -61,7 +62,8 @@ impl<const D: usize> Front<'_, D> {
         let due = accepted && (last || self.scene.output.due(self.recorded, self.lambda));
         let conducting = self.conductor.as_ref().zip(self.model.conduction.as_ref());
         if let Some((conductor, conduction)) = conducting.filter(|_| accepted) {
-            let values = potential(self.scene, self.model, self.setup, conductor)?;
+            let (values, unknowns) = potential(self.scene, self.model, self.setup, conductor)?;
+            self.potential_unknowns = unknowns;
             if let Some(probes) = conduction.probes {
                 self.potential_drop = drop(self.setup, probes, &values);
             }
@@ -111,11 +113,21 @@ impl<const D: usize> Front<'_, D> {
             ("solve_iterations", self.iterations as f64),
             ("windows", self.windows as f64),
         ];
+        let coupled = self
+            .conductor
+            .is_some()
+            .then_some(self.potential_unknowns as f64);
         let numbers = numbers
             .into_iter()
+            .chain(coupled.map(|n| ("potential_unknowns", n)))
             .map(|(n, v)| (n.to_owned(), v))
             .collect();
-        let mut summary = summary(self.setup, self.window.unknowns(), steps, numbers);
+        let bodies = [
+            Some(self.solid.body.bond_values()),
+            self.conductor.as_ref().map(Body::bond_values),
+        ];
+        let stored = self.broken.len() + bodies.into_iter().flatten().sum::<usize>();
+        let mut summary = summary(self.setup, self.window.unknowns(), stored, steps, numbers);
         if self.crack.stopped {
             summary.stopped = Some("the crack reached the stop region".into());
         }

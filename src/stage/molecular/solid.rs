@@ -1,0 +1,81 @@
+//! Owns an elastic body: the moduli of its bonds and what is held of it.
+
+use super::setup::Setup;
+use super::{Bending, Elasticity, Molecular};
+use crate::error::Result;
+use crate::physics::anisotropic::body::Body;
+use crate::physics::anisotropic::bond::{Bond, Moduli};
+use crate::physics::anisotropic::conductivity::{Conductivity, calibration};
+use crate::physics::anisotropic::cosine::CosineLaw;
+use crate::physics::anisotropic::tensor::PlaneTensor;
+use crate::stage::scene::Scene;
+
+/// An elastic body and what is held of it at time 1 or at the end.
+pub struct Solid<const D: usize> {
+    pub body: Body<D>,
+    /// Of each bond of the stencil.
+    pub moduli: Vec<Moduli>,
+    pub held: Vec<Option<f64>>,
+}
+
+pub const DISPLACEMENT: [&[&str]; 3] = [&["x"], &["y"], &["rotation"]];
+
+impl<const D: usize> Solid<D> {
+    pub fn new(
+        scene: &Scene,
+        model: &Molecular,
+        elasticity: &Elasticity,
+        tensor: &PlaneTensor,
+        setup: &Setup,
+    ) -> Result<Self> {
+        let micro = setup.micromoduli(elasticity, tensor)?;
+        let bending = match &elasticity.bending {
+            Some(b) => bending_moduli(b, elasticity, setup)?,
+            None => vec![0.0; setup.bonds.len()],
+        };
+        let law = |(b, bending): (&Bond, f64)| Moduli {
+            axial: micro.axial(b.psi()),
+            shear: if D == 2 { 0.0 } else { micro.shear(b.psi()) },
+            bending,
+        };
+        let moduli: Vec<Moduli> = setup.bonds.iter().zip(bending).map(law).collect();
+        let blocks = setup
+            .bonds
+            .iter()
+            .zip(&moduli)
+            .map(|(b, k)| b.stiffness(k, setup.cell))
+            .collect();
+        let body = setup.finish(model, Body::new(setup.family.clone(), blocks));
+        let names: [&[&str]; D] = std::array::from_fn(|d| DISPLACEMENT[d]);
+        let t = scene.time.as_ref().map_or(1.0, |time| time.end);
+        let held = setup.held(scene, model, names, t, Some(tensor))?;
+        Ok(Solid { body, moduli, held })
+    }
+}
+
+/// k_b of each bond: E = (δ³/6) ∫ k_b n nᵀ dψ, of which eqs. 180, 181 are the case n = 2; calibrated,
+/// E = ½ Σ L k_b n nᵀ α Δv for the stencil.
+fn bending_moduli(bending: &Bending, elasticity: &Elasticity, setup: &Setup) -> Result<Vec<f64>> {
+    let Bending {
+        first,
+        second,
+        exponent,
+    } = *bending;
+    let zeta = elasticity.angle_deg.to_radians();
+    let scale = 6.0 / setup.horizon().powi(3);
+    let law = CosineLaw::of_second_moment(scale * first, scale * second, exponent, zeta)?;
+    let mut k: Vec<f64> = setup.bonds.iter().map(|b| law.at(b.psi())).collect();
+    if elasticity.calibrated {
+        let conducted: Vec<f64> = k
+            .iter()
+            .zip(&setup.bonds)
+            .map(|(k, b)| k * b.length_mm)
+            .collect();
+        let wanted = Conductivity::principal(first, second, zeta)?;
+        let c = calibration(&setup.bonds, &conducted, wanted.k())?;
+        k.iter_mut()
+            .zip(&setup.bonds)
+            .for_each(|(k, b)| *k *= b.second_harmonic(c));
+    }
+    Ok(k)
+}

@@ -2,11 +2,11 @@
 
 mod costs;
 mod couple_stress;
+mod stopped;
 mod turned;
 
-use bonepd_ct::error::{Error, Result};
+use bonepd_ct::error::Result;
 use bonepd_ct::stage::scene::frame::{Frame, Observer, Summary, Values};
-use bonepd_ct::stage::scene::state::State;
 use bonepd_ct::stage::scene::{Inputs, Scene, run};
 use bonepd_ct::topology::plane::Points;
 use std::path::Path;
@@ -565,78 +565,6 @@ fn energy_balances_while_a_strip_breaks() {
     // The crack ran straight: bonds' energies bracket G times the new area (2 mm x 20 mm x 0.5 N/mm = 20 N mm).
     let energy = number(&summary, "broken_bond_energy");
     assert!(energy > 0.85 * 20.0 && energy < 2.0 * 20.0, "{energy}");
-}
-
-/// Stops after so many events, keeping the state of the last but one; what was reported since is lost with it.
-struct Stopping {
-    frames: Vec<Frame>,
-    kept: Option<(State, usize)>,
-    from: Option<State>,
-    left: usize,
-}
-
-impl Observer for Stopping {
-    fn start(&mut self, _: &Points, _: usize) -> Result<()> {
-        Ok(())
-    }
-    fn frame(&mut self, frame: &Frame) -> Result<()> {
-        self.frames.push(frame.clone());
-        Ok(())
-    }
-    fn say(&mut self, _: &str) {}
-    fn resume(&mut self) -> Result<Option<State>> {
-        Ok(self.from.take())
-    }
-    fn keep(&mut self, state: &dyn Fn() -> State) -> Result<()> {
-        self.left -= 1;
-        match self.left {
-            0 => Err(Error::specimen("stopped", "go on")),
-            1 => {
-                self.kept = Some((state(), self.frames.len()));
-                Ok(())
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
-/// Fracture stopped in the middle of its steps and started again ends with the very numbers and fields of a run that never
-/// stopped. The window moves between the stops.
-#[test]
-fn stopped_fracture_goes_on_to_the_same_end() {
-    let wired = "[physics.continuum-molecular.conduction]
-        conductivity = [2, 1, 0]
-        probes = [[-14.5, 1.5], [-14.5, -1.5]]";
-    let text = strip_text(wired, 0.2).replace(
-        "hold = [",
-        "hold = [{ region = { box = [-15, -10, -13, -8] }, component = 'potential' },
-                { region = { box = [-15, 8, -13, 10] }, component = 'potential', value = 1 },",
-    ) + "\n        window_points = 200";
-    let scene = Scene::parse(&text, Path::new("strip.toml")).unwrap();
-    let attempt = |from: Option<State>, frames: Vec<Frame>, left: usize| {
-        let mut observer = Stopping {
-            frames,
-            kept: None,
-            from,
-            left,
-        };
-        let summary = run(&scene, &Inputs::default(), &mut observer);
-        (summary.ok(), observer)
-    };
-    let (whole, uncut) = attempt(None, Vec::new(), usize::MAX);
-    let whole = whole.unwrap();
-    assert!(number(&whole, "windows") > 1.0, "{whole:?}");
-    let (mut from, mut frames) = (None, Vec::new());
-    for left in [9, 24, 60] {
-        let (summary, stopped) = attempt(from, frames, left);
-        assert!(summary.is_none());
-        let (state, reported) = stopped.kept.unwrap();
-        frames = stopped.frames[..reported].to_vec();
-        from = Some(state);
-    }
-    let (parts, rest) = attempt(from, frames, usize::MAX);
-    assert_eq!(parts.unwrap(), whole);
-    assert_eq!(format!("{:?}", rest.frames), format!("{:?}", uncut.frames));
 }
 
 /// Two tips near held edges are followed with one window, which is kept while no tip leaves it: 2 windows in 134 solves.

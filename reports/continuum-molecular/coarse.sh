@@ -1,5 +1,5 @@
 #!/bin/sh
-# The report's fracture scenes on coarser grids, minutes instead of hours: sh reports/continuum-molecular/coarse.sh RUNS
+# The report's fracture scenes on coarser grids, minutes instead of hours (kinking: turns.sh): sh reports/continuum-molecular/coarse.sh RUNS
 set -eu
 runs=$1
 here=$(dirname "$0")/../../pipelines
@@ -16,9 +16,4 @@ for angle in 0 45 60 90; do
     scene compact-tension-$angle -e 's/spacing = 0.3/spacing = 0.6/; s/0, 10.2, 0.3, 12/0, 10.2, 0.6, 12/' \
         -e 's/0, -12, 0.3, -10.2/0, -12, 0.6, -10.2/; s/25.6, 0.15/25.5, 0.3/; s/9\.288/9.3/; s/step = 0.004/step = 0.01/' \
         -e 's/times = \[0.2\]/times = [0.2, 0.3]/; s/\[-6.3, 0.45\], \[-6.3, -0.45\]/[-6.15, 0.9], [-6.15, -0.9]/'
-done
-for material in silicon anisotropic; do
-    sed -e 's/spacing = 0.0166*/spacing = 0.025/; s/0\.908/0.8625/; s/tip = \[0, 0\]/tip = [0, 0]\nwindow_points = 500/' \
-        "$here/scene-crack-kinking-$material.toml" > "$runs/crack-kinking-$material-40.toml"
-    bonepd-ct scene "$runs/crack-kinking-$material-40.toml" -o "$runs/crack-kinking-$material-40"
 done

@@ -22,8 +22,6 @@ RUNS, OUT = map(pathlib.Path, sys.argv[1:3])
 HUES = ["#0072B2", "#D55E00", "#000000", "#009E73"]
 DASHES = ["-", "--", ":", "-."]
 MARKS = ["o", "s", "D", "^"]
-# Folders of turns.sh, and what they are called.
-KINDS = [("turn", "mean over 8 grids, a/40")]
 plt.rcParams.update({"font.family": "DejaVu Sans", "font.size": 9, "axes.grid": True, "grid.color": "#cccccc"})
 
 
@@ -130,11 +128,11 @@ ENERGY = {
 TURNS = ["0", "11.25", "22.5", "33.75", "45.001", "56.25", "67.5", "78.75"]
 
 
-def kinks_on_grids(material, kind):
-    """Kinks (rows: turns of the grid, columns: mixities) relative to the crack, or None where a run is missing."""
+def kinks_on_grids(material):
+    """Kinks of turns.sh (rows: turns of the grid, columns: mixities) relative to the crack, or None where a run is missing."""
     rows = []
     for turn in TURNS:
-        path = RUNS / f"crack-kinking-{material}-{kind}-{turn}" / "scene.json"
+        path = RUNS / f"crack-kinking-{material}-turn-{turn}" / "scene.json"
         if not path.exists():
             print(f"left out: {path} is missing")
             return None
@@ -147,6 +145,19 @@ def deviation(found, criterion):
     return sum(abs(f - c) for f, c in zip(found, criterion)) / len(criterion)
 
 
+def table(material, rows, mean, scatter):
+    """The report's rows: kinks, then the mean deviation from hoop stress and from energy."""
+    criteria = [c[material] for c in (HOOP, ENERGY)]
+    for name, row in [*zip((f"{float(t):g}°" for t in TURNS), rows), ("mean", mean)]:
+        cells = " | ".join(f"{v:.1f}" for v in row)
+        print(f"| {material}, {name} | {cells} | {' | '.join(f'{deviation(row, c):.2f}' for c in criteria)} |")
+    print(f"| {material}, scatter | {' | '.join(f'{v:.1f}' for v in scatter)} | | |")
+    single = [sum(deviation(r, c) for r in rows) / len(rows) for c in criteria]
+    largest = [max(abs(m - v) for m, v in zip(mean, c)) for c in criteria]
+    print(f"{material}: one grid deviates by {single[0]:.2f} (hoop stress), {single[1]:.2f} (energy) in the mean; the mean of the "
+          f"grids at most by {largest[0]:.2f}, {largest[1]:.2f}; mean scatter {sum(scatter) / len(scatter):.2f}")
+
+
 def kinking():
     """Kinks on eight grids beside the two criteria: each grid as a dot, their mean with its scatter as a bar."""
     figure, axes = plt.subplots(1, 2, figsize=(7.4, 3.4), sharey=True)
@@ -154,31 +165,19 @@ def kinking():
     for axis, material in zip(axes, HOOP):
         axis.plot(mixities, [-a for a in HOOP[material]], color=HUES[2], lw=1, label="maximum hoop stress")
         axis.plot(mixities, [-a for a in ENERGY[material]], "--", color=HUES[3], lw=1, label="maximum energy release")
-        for k, (kind, label) in enumerate(KINDS):
-            rows = kinks_on_grids(material, kind)
-            if rows is None:
-                continue
-            for turn, row in zip(TURNS, rows):
-                cells = " | ".join(f"{v:.1f}" for v in row)
-                print(f"{material}, {label} | {turn}° | {cells} | {deviation(row, HOOP[material]):.1f} | "
-                      f"{deviation(row, ENERGY[material]):.1f} |")
-            columns = list(zip(*rows))
-            mean = [sum(c) / len(c) for c in columns]
-            scatter = [math.sqrt(sum((v - m) ** 2 for v in c) / (len(c) - 1)) for c, m in zip(columns, mean)]
-            single = [sum(deviation(r, c[material]) for r in rows) / len(rows) for c in (HOOP, ENERGY)]
-            ensemble = [deviation(mean, c[material]) for c in (HOOP, ENERGY)]
-            print(f"{material}, {label} | mean | {' | '.join(f'{v:.1f}' for v in mean)} | {ensemble[0]:.1f} | {ensemble[1]:.1f} |")
-            print(f"{material}, {label} | scatter | {' | '.join(f'{v:.1f}' for v in scatter)} | | |")
-            print(f"{material}, {label}: mean deviation of one grid {single[0]:.2f} (hoop stress), {single[1]:.2f} (energy); of the "
-                  f"mean over grids {ensemble[0]:.2f}, {ensemble[1]:.2f}; largest of the mean "
-                  f"{max(abs(m - c) for m, c in zip(mean, HOOP[material])):.2f}; scatter in the mean {sum(scatter) / 10:.2f}")
-            shifted = [m + 1.5 * (2 * k - len(KINDS) + 1) for m in mixities]
-            axis.errorbar(shifted, [-m for m in mean], scatter, fmt=MARKS[k], color=HUES[k], ms=5, lw=1, capsize=3,
-                          label=label)
-            if k == 0:
-                axis.plot(shifted * len(rows), [-v for row in rows for v in row], ".", color="#999999", ms=3, zorder=0)
         axis.set_title({"silicon": "silicon <100>", "anisotropic": "fully anisotropic"}[material], fontsize=9)
         axis.set_xlabel("mixity (degrees)")
+        rows = kinks_on_grids(material)
+        if rows is None:
+            continue
+        columns = list(zip(*rows))
+        mean = [sum(c) / len(c) for c in columns]
+        scatter = [math.sqrt(sum((v - m) ** 2 for v in c) / (len(c) - 1)) for c, m in zip(columns, mean)]
+        table(material, rows, mean, scatter)
+        axis.plot(mixities * len(rows), [-v for row in rows for v in row], ".", color="#999999", ms=3, zorder=0,
+                  label="one grid, a/40")
+        axis.errorbar(mixities, [-m for m in mean], scatter, fmt=MARKS[0], color=HUES[0], ms=5, lw=1, capsize=3,
+                      label="mean of 8 grids")
     axes[0].set_ylabel("kink (degrees)")
     for axis in axes:
         axis.legend(fontsize=8, loc="lower right")

@@ -144,9 +144,6 @@ pub struct Fracture {
     pub exponent: u32,
     #[serde(default = "first")]
     pub frequency: u32,
-    /// Give each direction of the stencil the share of its sector in the fracture energy of straight lines.
-    #[serde(default)]
-    pub calibrated: bool,
     /// Bonds break in extension only.
     #[serde(default = "yes")]
     pub extension_only: bool,

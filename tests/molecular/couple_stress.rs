@@ -94,22 +94,19 @@ fn errors(layer: f64, calibrated: bool) -> [f64; 2] {
     ]
 }
 
-/// Of second order in horizon over layer.
+/// Convergence to the closed form as the horizon falls against the layer (layer over horizon 1.67, 3.33, 6.67): 0.34, 0.040 and
+/// 0.0038 % for the rotation, of second order at least. Without calibration the stencil's own moduli, which do not
+/// converge, show in the displacement.
 #[test]
 fn couple_stresses_make_the_local_boundary_layer_of_rotation() {
     let [coarse, middle, fine] = [5.0, 10.0, 20.0].map(|layer| errors(layer, true));
-    println!(
-        "{coarse:?} {middle:?} {fine:?} uncalibrated {:?} {:?} {:?}",
-        errors(5.0, false),
-        errors(10.0, false),
-        errors(20.0, false)
-    );
     for d in 0..2 {
         assert!(
-            (coarse[d] / middle[d]).log2() > 1.8,
+            (coarse[d] / middle[d]).log2() > 2.0,
             "{coarse:?} {middle:?}"
         );
-        assert!((middle[d] / fine[d]).log2() > 1.8, "{middle:?} {fine:?}");
+        assert!((middle[d] / fine[d]).log2() > 2.0, "{middle:?} {fine:?}");
     }
-    assert!(middle[0] < 0.01, "{middle:?}");
+    assert!(middle[0] < 5e-4 && fine[1] < 5e-6, "{middle:?} {fine:?}");
+    assert!(errors(20.0, false)[1] > 5e-5);
 }

@@ -68,7 +68,6 @@ fn a_crack_tip_may_lie_at_any_angle_to_the_grid() {
             size += exact[0] * exact[0] + exact[1] * exact[1];
         }
         let error = f64::sqrt(error / size);
-        println!("turned by {degrees}: {error}");
         assert!(error < 0.01, "turned by {degrees}: {error}");
     }
 }

@@ -11,7 +11,6 @@ pub mod conductivity;
 pub mod cosine;
 pub mod crack_tip;
 pub mod micromoduli;
-pub mod sectors;
 pub mod small;
 pub mod tensor;
 pub mod tetrachiral;

@@ -51,7 +51,7 @@ struct Front<'a, const D: usize> {
     conductor: Option<Body<1>>,
     window: Window<D>,
     bonds: Vec<WindowBond>,
-    /// Under unit load, as of the last whole solution.
+    /// Under unit load, as of the last look at the whole body: renewed before every use.
     x: Vec<[f64; D]>,
     /// Largest energy ratio outside the window then, under unit load, and whether bonds have broken since.
     far: f64,

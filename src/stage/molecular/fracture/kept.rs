@@ -37,8 +37,6 @@ impl<const D: usize> Front<'_, D> {
         let numbers = |(p, slot): &(usize, usize)| [*p as f64, *slot as f64];
         let order: Vec<f64> = self.order.iter().flat_map(numbers).collect();
         state.put("fracture.order", order);
-        let x: Vec<f64> = self.x.iter().flatten().copied().collect();
-        state.put("fracture.x", x);
         self.window.save(&mut state);
         state
     }
@@ -59,9 +57,6 @@ impl<const D: usize> Front<'_, D> {
             .collect();
         self.bonds.retain(|b| !self.broken[b.slots[0]]);
         self.window.restore(&self.solid.body.blocks, since, state)?;
-        let x = state.array("fracture.x", self.x.len() * D)?;
-        let (x, _) = x.as_chunks::<D>();
-        self.x.copy_from_slice(x);
         (self.step, self.events) = (s[0] as usize, s[1] as usize);
         (self.lambda, self.recorded) = (s[2], s[3]);
         self.ledger = Ledger {

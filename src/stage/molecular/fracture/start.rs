@@ -2,7 +2,6 @@
 
 use super::{Front, Ledger};
 use crate::error::{Error, Result};
-use crate::physics::anisotropic::sectors::sector_factors;
 use crate::physics::anisotropic::toughness::critical_energy;
 use crate::stage::molecular::crack::Crack;
 use crate::stage::molecular::setup::Setup;
@@ -67,11 +66,6 @@ impl<'a, const D: usize> Front<'a, D> {
             params.frequency,
             angle,
         )?;
-        let mut critical: Vec<f64> = setup.bonds.iter().map(|b| law.at(b.psi())).collect();
-        if params.calibrated {
-            let factors = sector_factors(&setup.family.stencil);
-            critical.iter_mut().zip(factors).for_each(|(w, f)| *w *= f);
-        }
         let n = setup.points.len();
         let mut sound: Vec<bool> = (0..n)
             .map(|p| (0..D).any(|d| solid.held[p * D + d].is_some()))
@@ -91,7 +85,7 @@ impl<'a, const D: usize> Front<'a, D> {
         };
         let (window, x) = Window::new(&solid.body, setup, &solid.held, &[])?;
         let mut front = Front {
-            critical,
+            critical: setup.bonds.iter().map(|b| law.at(b.psi())).collect(),
             broken: vec![false; setup.family.len()],
             order: Vec::new(),
             before_window: 0,

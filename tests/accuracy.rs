@@ -107,4 +107,56 @@ fn a_solve_that_will_not_fit_is_refused_with_what_would() {
     let (code, _, words) = run(&["solve", &out, "--lp", "0.0001", "--boundary", "floppy"]);
     assert_eq!(code, 2, "{words}");
     assert!(words.contains("lattice parameter of"), "{words}");
+    // Places that numbers cannot count, in every command that would lay them out.
+    let settings = ["--lp", "0.000000001", "--boundary", "floppy"];
+    for command in [&["solve"][..], &["solve", "--dry-run"], &["lattice"]] {
+        let (code, _, words) = run(&[command, &[&*out], &settings].concat());
+        assert_eq!(code, 2, "{command:?}: {words}");
+        assert!(words.contains("lattice parameter of"), "{command:?}: {words}");
+    }
+    for command in ["lattice", "solve"] {
+        let (code, _, words) = run(&[command, &out, "--lp", "0.0005", "--boundary", "firm"]);
+        assert_eq!(code, 2, "{words}");
+        let advised = words.split("lattice parameter of ").nth(1).unwrap();
+        let advised = advised.split_whitespace().next().unwrap();
+        assert!(advised.parse::<f64>().unwrap() > 0.0005, "{words}");
+    }
+}
+
+/// What `--dry-run` tells against what the solve then took, each in a program of its own.
+#[test]
+#[ignore = "half a minute"]
+fn memory_is_foretold_within_a_fifth() {
+    let dir = tempfile::tempdir().unwrap();
+    let (scan, out) = (dir.path().join("scan.nii.gz"), dir.path().join("out"));
+    let (scan, out) = (scan.to_str().unwrap(), out.to_str().unwrap());
+    let made = ["--size-mm", "3.2", "--spacing-mm", "0.02", "--bvtv", "0.2"];
+    assert_eq!(run(&[&["phantom", "-o", scan], &made[..]].concat()).0, 0);
+    let segmented = run(&["segment", scan, "-o", out, "--lower", "200", "--keep-grey"]);
+    assert_eq!(segmented.0, 0, "{}", segmented.2);
+    for settings in [
+        "--lp 0.03 --boundary firm",
+        "--lp 0.02 --boundary floppy",
+        "--lp 0.03 --boundary graded",
+        "--structure bcc --lp 0.03 --boundary graded",
+        "--structure fcc --lp 0.03 --boundary graded",
+        "--structure fcc --lp 0.03 --boundary floppy",
+        "--method voxel-fe",
+        "--method voxel-fe --load stiffness",
+    ] {
+        let settings: Vec<&str> = settings.split(' ').collect();
+        let solve = [&["solve", out, "--force"], &settings[..]].concat();
+        let (code, _, words) = run(&[&solve[..], &["--dry-run"]].concat());
+        assert_eq!(code, 0, "{words}");
+        let foretold = words.split("about ").nth(1).unwrap();
+        let foretold: f64 = foretold.split(' ').next().unwrap().parse().unwrap();
+        let (code, _, words) = run(&solve);
+        assert_eq!(code, 0, "{words}");
+        let took = rows(out)[0].peak_mib.expect("measured");
+        println!("{settings:?}: {foretold:.0} MiB foretold, {took:.0} taken");
+        assert!(
+            (foretold / took - 1.0).abs() < 0.2,
+            "{settings:?}: {foretold}, {took}"
+        );
+    }
 }

@@ -3,7 +3,7 @@
 //! Memory goes with what is kept a node or site (vectors, neighbours, diagonal) and, on voxel elements, with the boxes of
 //! multigrid's aggregates (the assembled levels). The factors are fits to the program's own peaks, within 11 % on ten
 //! voxel meshes of 0.1 to 28 million nodes and within 15 % on twelve lattices of all kinds (`cargo bench --bench memory`
-//! prints both).
+//! prints both for fourteen solves, `cargo test --release -- --ignored memory_is` for eight whole commands).
 
 use crate::error::Result;
 use crate::grid::Grid;
@@ -28,8 +28,9 @@ const SITE: f64 = 115.0;
 const SITE_BOX: f64 = 2500.0;
 const PIECE: f64 = 360.0;
 
-/// Bytes more a site of a factor of its own, in both precisions; and a node, of five fields that a stiffness tensor keeps.
-const WEIGHTED: f64 = 12.0;
+/// Bytes more a site of a factor of its own, in both precisions, and of a diagonal block that few others have; and a node, of
+/// the five fields that a stiffness tensor keeps.
+const WEIGHTED: f64 = 36.0;
 const KEPT_FIELDS: f64 = 60.0;
 
 /// Edge of multigrid's boxes in nodes.

@@ -112,7 +112,10 @@ fn a_solve_that_will_not_fit_is_refused_with_what_would() {
     for command in [&["solve"][..], &["solve", "--dry-run"], &["lattice"]] {
         let (code, _, words) = run(&[command, &[&*out], &settings].concat());
         assert_eq!(code, 2, "{command:?}: {words}");
-        assert!(words.contains("lattice parameter of"), "{command:?}: {words}");
+        assert!(
+            words.contains("lattice parameter of"),
+            "{command:?}: {words}"
+        );
     }
     for command in ["lattice", "solve"] {
         let (code, _, words) = run(&[command, &out, "--lp", "0.0005", "--boundary", "firm"]);

@@ -7,7 +7,10 @@
 // Lanes read best by index.
 #![allow(clippy::needless_range_loop)]
 
+mod encode;
+
 use crate::topology::stencil::Stencil;
+use encode::{Stretches, encode};
 use rayon::prelude::*;
 use std::ops::{Deref, Range};
 
@@ -275,133 +278,5 @@ impl Ends<'_> {
     }
 }
 
-/// What a task has encoded.
-struct Stretches {
-    numbers: Vec<u32>,
-    /// The stretch, of the task's own, at each [`DECODED`] sites.
-    at: Vec<u32>,
-}
-
-/// Writes the sites' words. `ends(i, row)` tells the bonds' ends of site `i`.
-fn encode(
-    sites: usize,
-    chains: &Chains,
-    words: &mut [u32],
-    starts: impl Fn(usize) -> bool,
-    ends: impl Fn(usize, &mut [Option<u32>; MOST]),
-) -> Stretches {
-    let (mut numbers, mut at) = (Vec::new(), Vec::new());
-    let mut row = [None; MOST];
-    // By chain: what its first bond leads to, or would lead to next. Unknown until the stretch has met one of its bonds.
-    let mut next: [Option<u32>; NUMBERS] = [None; NUMBERS];
-    for (i, word) in words.iter_mut().enumerate() {
-        ends(i, &mut row);
-        let bits = (0..MOST).filter(|&b| row[b].is_some());
-        *word = bits.map(|b| BITS[b]).sum();
-        if starts(i) {
-            if i.is_multiple_of(DECODED) {
-                at.push((numbers.len() / chains.count) as u32);
-            }
-            next = [None; NUMBERS];
-            numbers.resize(numbers.len() + chains.count, 0);
-        }
-        let own = numbers.len() - chains.count;
-        for (b, end) in row.iter().enumerate() {
-            let Some(end) = end else { continue };
-            assert!((*end as usize) < sites, "a bond leads to a site");
-            let c = usize::from(chains.of[b]);
-            let first = end - chains.ahead(b, *word);
-            match next[c] {
-                Some(next) => assert_eq!(next, first, "sites are numbered along rows"),
-                // Nothing of the chain was met before: its numbers have not moved since the stretch began.
-                None => (next[c], numbers[own + c]) = (Some(first), first),
-            }
-        }
-        // The first bond of a chain is the one that is left behind.
-        for b in (0..MOST).filter(|&b| chains.before[0][b] == 0 && row[b].is_some()) {
-            let next = &mut next[usize::from(chains.of[b])];
-            *next = next.map(|n| n + 1);
-        }
-        if starts(i) {
-            *word |= FIRST;
-        }
-    }
-    Stretches { numbers, at }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::topology::stencil::Structure;
-    use rand_pcg::Pcg64Mcg;
-    use rand_pcg::rand_core::Rng;
-
-    /// Sites of a random mask on a grid, along x, and their numbers on the grid.
-    fn sites(structure: Structure, n: [i32; 3], dense: u32) -> (Vec<[i32; 3]>, Vec<Option<u32>>) {
-        let mut random = Pcg64Mcg::new(u128::from(dense) * 2 + 1);
-        let (mut sites, mut number) = (Vec::new(), Vec::new());
-        for k in 0..n[2] {
-            for j in 0..n[1] {
-                for i in 0..n[0] {
-                    let here = structure.allows([i, j, k]) && random.next_u32() % 100 < dense;
-                    number.push(here.then_some(sites.len() as u32));
-                    if here {
-                        sites.push([i, j, k]);
-                    }
-                }
-            }
-        }
-        (sites, number)
-    }
-
-    /// Every structure, sparse to full, rows longer and shorter than what is decoded at a time.
-    #[test]
-    fn what_goes_in_comes_out() {
-        for structure in Structure::ALL {
-            for (n, dense) in [
-                ([150, 9, 8], 100),
-                ([150, 9, 8], 90),
-                ([40, 30, 20], 50),
-                ([40, 30, 20], 12),
-                ([3, 40, 50], 60),
-                ([1, 1, 1], 100),
-            ] {
-                let (sites, number) = sites(structure, n, dense);
-                let stencil = structure.stencil();
-                let end = |s: usize, b: usize| {
-                    let at: [i32; 3] =
-                        std::array::from_fn(|a| sites[s][a] + stencil.direction(b)[a]);
-                    let inside = (0..3).all(|a| (0..n[a]).contains(&at[a]));
-                    inside.then(|| number[((at[2] * n[1] + at[1]) * n[0] + at[0]) as usize])?
-                };
-                let step = structure.row_step();
-                let follows = |s: usize| {
-                    let [i, j, k] = sites[s];
-                    s > 0 && sites[s - 1] == [i - step, j, k]
-                };
-                let neighbours = Neighbours::new(sites.len(), &stencil, follows, end);
-                let expected = |s: usize, b: usize| end(s, b).unwrap_or(s as u32);
-                let z = stencil.coordination();
-                for s in (0..sites.len()).step_by(7) {
-                    let row = neighbours.row(s);
-                    assert!(row.len() == z && (0..z).all(|b| row[b] == expected(s, b)));
-                    let bonds = (0..z).filter(|&b| end(s, b).is_some()).count();
-                    assert_eq!(neighbours.bonds(s) as usize, bonds);
-                }
-                for start in (0..sites.len()).step_by(41) {
-                    let range = start..(start + 200).min(sites.len());
-                    let mut met = start;
-                    neighbours.each(range.clone(), |s, row| {
-                        assert_eq!(s, met);
-                        assert!(
-                            (0..z).all(|b| row[b] == expected(s, b)),
-                            "{structure:?} {s}"
-                        );
-                        met += 1;
-                    });
-                    assert_eq!(met, range.end);
-                }
-            }
-        }
-    }
-}
+mod tests;

@@ -7,7 +7,7 @@ use bonepd_ct::error::Result;
 use bonepd_ct::grid::Grid;
 use bonepd_ct::io::nifti;
 use bonepd_ct::stage::scene::frame::{Frame, Observer};
-use bonepd_ct::stage::scene::{Inputs, Scene, run};
+use bonepd_ct::stage::scene::{Inputs, Scene, check, run};
 use bonepd_ct::topology::plane::Points;
 use bonepd_ct::volume::Volume;
 use std::path::{Path, PathBuf};
@@ -49,6 +49,22 @@ fn every_remodelling_scene_file_can_be_read() {
         }
     }
     assert!(count > 20, "{count} scenes");
+}
+
+/// What `--dry-run` does with each scene of a continuum-molecular model.
+#[test]
+fn every_molecular_scene_file_passes_a_dry_run() {
+    let mut count = 0;
+    for entry in std::fs::read_dir(pipelines()).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if name.starts_with("scene-") && name.ends_with(".toml") {
+            let scene = Scene::parse(&std::fs::read_to_string(&path).unwrap(), &path).unwrap();
+            check(&scene, &Inputs::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+            count += 1;
+        }
+    }
+    assert!(count > 15, "{count} scenes");
 }
 
 /// The local twin of the unit square: spec A3, and all files a scene leaves.

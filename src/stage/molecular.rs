@@ -1,20 +1,23 @@
 //! Owns continuum-molecular scenes: which physics a scene has, and which solution that asks for. Lengths in mm, forces
 //! in N, moduli in MPa, or any consistent units.
 
+pub mod check;
 pub mod conduction;
 pub mod crack;
 pub mod equilibrium;
 pub mod fracture;
 pub mod modes;
+mod path;
 pub mod setup;
 pub mod solid;
 pub mod steady;
 pub mod sweep;
 mod tensors;
 mod unused;
+mod warnings;
 pub mod window;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::physics::anisotropic::tensor::{Plane, PlaneTensor};
 use crate::stage::scene::conditions::Region;
 use crate::stage::scene::frame::{Observer, Summary};
@@ -61,7 +64,8 @@ pub struct Elasticity {
     pub tetrachiral: Option<TetrachiralParams>,
     /// A 6 x 6 apparent stiffness cut to a plane.
     pub from_scan: Option<FromScan>,
-    pub plane: Plane,
+    /// Of `young` and `from_scan`; plane stress where it is left out.
+    pub plane: Option<Plane>,
     /// Angle of the material's first axis.
     pub angle_deg: f64,
     /// Make the stencil store the exact energy of a homogeneous strain.
@@ -214,42 +218,44 @@ fn window() -> usize {
 }
 
 /// Runs a continuum-molecular scene.
+///
+/// # Errors
+/// What [`check::check`] refuses, and a body that is not held or not stable.
 pub fn run(
     scene: &Scene,
     model: &Molecular,
     inputs: &Inputs,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    if let Some(sweep) = &model.sweep {
-        return sweep::run(scene, model, sweep, inputs, observer);
+    check::check(scene, model, inputs)?;
+    match &model.sweep {
+        Some(sweep) => sweep::run(scene, model, sweep, inputs, observer),
+        None => solve(scene, model, inputs, observer),
     }
-    unused::refuse(model)?;
+}
+
+/// Solves a scene that has been checked, for one value of what is swept.
+fn solve(
+    scene: &Scene,
+    model: &Molecular,
+    inputs: &Inputs,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
     let setup = setup::Setup::new(scene, model, inputs)?;
-    let Some(elasticity) = &model.elasticity else {
-        let Some(conduction) = &model.conduction else {
-            return Err(Error::setting(
-                "physics.continuum-molecular",
-                "found neither elasticity nor conduction",
-                "add the table of at least one",
-            ));
-        };
-        return conduction::conduct(scene, model, conduction, &setup, observer);
+    let warnings = warnings::negative(model, &setup, inputs)?;
+    warnings.iter().for_each(|words| observer.warn(words));
+    let solved = match (&model.elasticity, &model.conduction) {
+        (Some(elasticity), _) => {
+            let tensor = elasticity.tensor(inputs)?;
+            match elasticity.turns(&setup.micromoduli(elasticity, &tensor)?) {
+                true => elastic::<3>(scene, model, elasticity, &tensor, &setup, observer),
+                false => elastic::<2>(scene, model, elasticity, &tensor, &setup, observer),
+            }
+        }
+        (None, Some(conduction)) => conduction::conduct(scene, model, conduction, &setup, observer),
+        (None, None) => unreachable!("refused by the check"),
     };
-    let tensor = elasticity.tensor(inputs)?;
-    let micro = setup.micromoduli(elasticity, &tensor)?;
-    for negative in micro.negative() {
-        observer.say(&format!(
-            "micromodulus {} is negative, {:.3} of the largest k_n at {:.0} degrees: the pair potential is not convex \
-             there and cracks may be unstable",
-            negative.name, negative.relative_minimum, negative.direction_deg
-        ));
-    }
-    // Without shear and bending micromoduli there is nothing to turn: two unknowns per point.
-    if micro.is_central() && elasticity.bending.is_none() {
-        elastic::<2>(scene, model, elasticity, &tensor, &setup, observer)
-    } else {
-        elastic::<3>(scene, model, elasticity, &tensor, &setup, observer)
-    }
+    solved.map_err(|error| warnings::blame(error, &warnings))
 }
 
 fn elastic<const D: usize>(

@@ -156,14 +156,15 @@ impl Scene {
     }
 }
 
-/// Refuses what a run would refuse before its first step; of continuum-molecular scenes, what their geometry shows. The
-/// material points.
+/// Refuses what a run would refuse before its first step. The material points.
 pub fn check(scene: &Scene, inputs: &Inputs) -> Result<Points> {
     scene.output.check()?;
     match &scene.physics {
         Physics::BondBased(params) => bond_based::check(scene, params, inputs)?,
         Physics::Continuum(params) => continuum::check(scene, params, inputs)?,
-        Physics::ContinuumMolecular(_) => {}
+        Physics::ContinuumMolecular(model) => {
+            crate::stage::molecular::check::check(scene, model, inputs)?;
+        }
     }
     scene.points(inputs)
 }

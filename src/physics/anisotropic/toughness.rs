@@ -35,7 +35,8 @@ fn doubled_sine(n: u32) -> f64 {
 /// `frequency` 2: at 45 degrees), eqs. 93-103 for any even exponent.
 ///
 /// # Errors
-/// If the ratio of the energies is beyond what the exponent can carry: some bonds would release energy by breaking.
+/// A frequency other than 1 and 2. If the ratio of the energies is beyond what the exponent can carry: some bonds would
+/// release energy by breaking.
 pub fn critical_energy(
     across_first: f64,
     across_second: f64,
@@ -45,6 +46,13 @@ pub fn critical_energy(
     zeta: f64,
 ) -> Result<CosineLaw> {
     even(exponent)?;
+    if ![1, 2].contains(&frequency) {
+        return Err(Error::setting(
+            "fracture.frequency",
+            format!("found {frequency}"),
+            "give 1 (fracture.energy normal to the material's two axes) or 2 (normal to its first axis, and at 45 degrees)",
+        ));
+    }
     let scale = horizon_mm.powi(3) / 3.0;
     let [a, b] = crossing(exponent, frequency);
     let span = (across_first - across_second) / (scale * (a - b));
@@ -59,7 +67,7 @@ pub fn critical_energy(
     let floor = -1e-12 * law.first.abs().max(law.second.abs());
     if !(across_first > 0.0 && across_second > 0.0) || law.first < floor || law.second < floor {
         return Err(Error::setting(
-            "toughness",
+            "fracture.energy",
             format!(
                 "fracture energies {across_first} and {across_second} N/mm with exponent {exponent}: \
                  the critical bond energies are {:.4e} and {:.4e}, one of them not positive",
@@ -149,5 +157,16 @@ mod tests {
     fn a_ratio_beyond_the_exponent_is_refused() {
         assert!(critical_energy(3.0, 1.0, 1.0, 4, 1, 0.0).is_err());
         assert!(critical_energy(2.6, 1.0, 1.0, 4, 1, 0.0).is_ok());
+        let error = critical_energy(3.0, 1.0, 1.0, 4, 1, 0.0).unwrap_err();
+        assert!(error.to_string().contains("fracture.energy"), "{error}");
+    }
+
+    /// The integrals are known for two frequencies only.
+    #[test]
+    fn other_frequencies_are_refused() {
+        for frequency in [0, 3, 4] {
+            let error = critical_energy(1.0, 1.0, 1.0, 4, frequency, 0.0).unwrap_err();
+            assert!(error.to_string().contains("fracture.frequency"), "{error}");
+        }
     }
 }

@@ -245,6 +245,10 @@ impl Observer for Writer<'_> {
         self.bar.suspend(|| self.session.detail(line));
     }
 
+    fn warn(&mut self, line: &str) {
+        self.bar.suspend(|| self.session.warn(line));
+    }
+
     fn resume(&mut self) -> Result<Option<State>> {
         self.last_state()
     }

@@ -1,13 +1,15 @@
 //! Owns conduction of heat and of charge: steady, transient, and through a body whose bonds break.
 
 use super::equilibrium::{Factorised, factorise, right_hand_side, solve};
+use super::path::stranded;
 use super::setup::Setup;
 use super::steady::{loads, scalar, summary};
 use super::{Conduction, Molecular};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::operator::Operator;
 use crate::physics::anisotropic::body::Body;
 use crate::stage::scene::Scene;
+use crate::stage::scene::conditions::Time;
 use crate::stage::scene::frame::{Field, Frame, Observer, Summary, Values};
 
 pub const CONDUCTED: [&[&str]; 1] = [&["temperature", "potential"]];
@@ -23,7 +25,6 @@ pub fn conduct(
     let (body, k) = setup.conductor(model, conduction)?;
     match (&scene.time, conduction.capacity) {
         (Some(time), Some(capacity)) => {
-            time.check()?;
             let mut transient = Transient::new(scene, model, setup, body, capacity, time.step)?;
             let start = vec![conduction.initial; setup.points.len()];
             transient.run(scene, model, setup, &k, start, observer)
@@ -66,7 +67,9 @@ fn conducted(
                 .map(|[a, b, c]| c * x[0].powf(*a) * x[1].powf(*b))
                 .sum::<f64>()
         };
-        let error = (0..values.len()).fold(0.0_f64, |m, p| m.max((values[p] - exact(p)).abs()));
+        let errors = (0..values.len()).map(|p| (values[p] - exact(p)).abs());
+        // Unlike the largest of two, this keeps what is not a number.
+        let error = errors.fold(0.0_f64, |m, e| if m >= e { m } else { e });
         numbers.push(("largest_difference_from_known_field".into(), error));
     }
     if let Some(probes) = conduction.probes {
@@ -123,13 +126,6 @@ impl Transient {
         capacity: f64,
         step: f64,
     ) -> Result<Self> {
-        if capacity.is_nan() || capacity <= 0.0 {
-            return Err(Error::setting(
-                "conduction.capacity",
-                format!("found {capacity}"),
-                "give a positive heat capacity per volume",
-            ));
-        }
         let held = setup.held(scene, model, CONDUCTED, 0.0, None)?;
         // Half the conductances stand in the matrix of a step; the operator itself keeps them whole.
         let halved = |b: &crate::physics::anisotropic::bond::Blocks<1>| {
@@ -188,8 +184,7 @@ impl Transient {
         start: Vec<f64>,
         observer: &mut dyn Observer,
     ) -> Result<Summary> {
-        let end = scene.time.as_ref().map_or(self.step, |t| t.end);
-        let steps = (end / self.step).round().max(1.0) as usize;
+        let steps = scene.time.as_ref().map_or(Ok(1), Time::steps)? as usize;
         observer.start(&setup.points, steps)?;
         let mut held = setup.held(scene, model, CONDUCTED, 0.0, None)?;
         let mut x: Vec<[f64; 1]> = start
@@ -234,18 +229,23 @@ impl Transient {
     }
 }
 
-/// The potential of a body whose broken bonds no longer conduct, per unit thickness, and the number of its unknowns.
+/// The potential at time `t` of a body whose broken bonds no longer conduct, per unit thickness, and the number of its
+/// unknowns. Not a number where a current has no path.
 pub fn potential(
     scene: &Scene,
     model: &Molecular,
     setup: &Setup,
     body: &Body<1>,
+    broken: &[bool],
+    t: f64,
 ) -> Result<(Vec<f64>, usize)> {
-    let held = setup.held(scene, model, CONDUCTED, 1.0, None)?;
-    let force = loads(scene, model, setup, CONDUCTED, 1.0)?;
+    let held = setup.held(scene, model, CONDUCTED, t, None)?;
+    let force = loads(scene, model, setup, CONDUCTED, t)?;
+    let stranded = stranded(&setup.family, broken, &held, &force);
     let mut factorised = factorise(body, &setup.points, &held, &[], &[])?;
     let mut q = right_hand_side(body, &factorised, &held, &force);
     factorised.llt.solve(&mut q);
     let x: Vec<[f64; 1]> = factorised.expand(&q, &held);
-    Ok((x.iter().map(|v| v[0]).collect(), q.len()))
+    let value = |(x, stranded): (&[f64; 1], bool)| if stranded { f64::NAN } else { x[0] };
+    Ok((x.iter().zip(stranded).map(value).collect(), q.len()))
 }

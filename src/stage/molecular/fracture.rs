@@ -7,7 +7,7 @@
 
 mod kept;
 mod report;
-mod start;
+pub mod start;
 mod watch;
 
 use super::crack::Crack;
@@ -15,7 +15,7 @@ use super::setup::Setup;
 use super::solid::Solid;
 use super::window::{Window, WindowBond, opposite};
 use super::{Fracture, Molecular};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::physics::anisotropic::body::{Body, RESIDUAL};
 use crate::stage::scene::Scene;
 use crate::stage::scene::frame::{Observer, Summary};
@@ -84,30 +84,16 @@ pub fn run<const D: usize>(
     setup: &Setup,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    let time = scene.time.as_ref().ok_or_else(|| {
-        Error::setting(
-            "time",
-            "fracture needs a load that grows, found no time",
-            "add [time] with end and step; hold values must be proportional to time",
-        )
-    })?;
-    time.check()?;
-    if model
-        .elasticity
-        .as_ref()
-        .is_some_and(|e| e.thermal.is_some())
-        || !(0.0..1.0).contains(&params.batch)
-    {
-        return Err(Error::setting(
-            "fracture",
-            "thermal strain with fracture, or a batch outside 0 to 1",
-            "take one of them out; batch is a share",
-        ));
-    }
-    solid.held = start::unit_load(scene, model, setup, &solid, time.end)?;
-    observer.start(&setup.points, (time.end / time.step).round() as usize)?;
+    let time = start::growing(scene)?;
+    let steps = time.steps()? as usize;
+    solid.held = start::unit_load(scene, setup, &solid, time.end)?;
+    observer.start(&setup.points, steps)?;
     let mut front = Front::new(scene, model, params, solid, setup)?;
-    let steps = (time.end / time.step).round().max(1.0) as usize;
+    observer.say(&format!(
+        "bonds never break at {} of {} points, unbreakable or held in some component",
+        front.sound_points(),
+        setup.points.len()
+    ));
     match observer.resume()? {
         Some(state) => {
             front.restore(&state)?;

@@ -26,13 +26,6 @@ pub struct Setup {
 
 impl Setup {
     pub fn new(scene: &Scene, model: &Molecular, inputs: &Inputs) -> Result<Self> {
-        if model.thickness.is_nan() || model.thickness <= 0.0 {
-            return Err(Error::setting(
-                "thickness",
-                format!("found {}", model.thickness),
-                "give a positive length",
-            ));
-        }
         let points = scene.points(inputs)?;
         let stencil = scene.stencil()?;
         let all = bonds(&stencil);
@@ -123,6 +116,9 @@ impl Setup {
     }
 
     /// Values held by `hold` and `known`, at time `t`; `names` are the components.
+    ///
+    /// # Errors
+    /// A component of a point that both hold.
     pub fn held<const D: usize>(
         &self,
         scene: &Scene,
@@ -131,31 +127,55 @@ impl Setup {
         t: f64,
         tensor: Option<&PlaneTensor>,
     ) -> Result<Vec<Option<f64>>> {
-        let mut held = vec![None; self.points.len() * D];
-        for hold in &scene.hold {
-            hold.value.check("hold.value")?;
-            let Some(d) = names
-                .iter()
-                .position(|n| n.contains(&hold.component.as_str()))
-            else {
-                if ["x", "y", "rotation", "temperature", "potential"]
-                    .contains(&hold.component.as_str())
-                {
-                    continue;
-                }
+        let mut held = self.holds(scene, names, t)?;
+        let known = self.known::<D>(model, tensor)?;
+        for (v, (held, known)) in held.iter_mut().zip(known).enumerate() {
+            if held.is_some() && known.is_some() {
+                let [x, y] = self.points.position(v / D);
                 return Err(Error::setting(
-                    "hold.component",
-                    format!("`{}` is not a component of this scene", hold.component),
-                    "use x, y, rotation (elasticity), temperature or potential (conduction)",
+                    "known.region",
+                    format!(
+                        "[[hold]] and known both prescribe {} of the point at [{x}, {y}]",
+                        names[v % D].join(" or ")
+                    ),
+                    "part their regions",
                 ));
+            }
+            *held = held.or(known);
+        }
+        Ok(held)
+    }
+
+    /// Values held by `hold` alone, at time `t`: the later one of the file holds. Components of other physics are no
+    /// part of this body.
+    pub fn holds<const D: usize>(
+        &self,
+        scene: &Scene,
+        names: [&[&str]; D],
+        t: f64,
+    ) -> Result<Vec<Option<f64>>> {
+        let mut held = vec![None; self.points.len() * D];
+        for (k, hold) in scene.hold.iter().enumerate() {
+            hold.value.check(&format!("hold[{k}].value"))?;
+            let component = hold.component.as_str();
+            let Some(d) = names.iter().position(|n| n.contains(&component)) else {
+                continue;
             };
-            for p in hold
-                .region
-                .select(&self.points, self.points.len(), "hold.region")?
-            {
+            let key = format!("hold[{k}].region");
+            for p in hold.region.select(&self.points, self.points.len(), &key)? {
                 held[p * D + d] = Some(hold.value.at(t));
             }
         }
+        Ok(held)
+    }
+
+    /// Values held by `known`.
+    fn known<const D: usize>(
+        &self,
+        model: &Molecular,
+        tensor: Option<&PlaneTensor>,
+    ) -> Result<Vec<Option<f64>>> {
+        let mut held = vec![None; self.points.len() * D];
         for known in &model.known {
             let turn = known.angle_deg.to_radians();
             let tip = tensor.map(|t| CrackTip::new(&t.turned(-turn)));

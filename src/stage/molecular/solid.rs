@@ -7,6 +7,7 @@ use crate::physics::anisotropic::body::Body;
 use crate::physics::anisotropic::bond::{Bond, Moduli};
 use crate::physics::anisotropic::conductivity::{Conductivity, calibration};
 use crate::physics::anisotropic::cosine::CosineLaw;
+use crate::physics::anisotropic::micromoduli::Micromoduli;
 use crate::physics::anisotropic::tensor::PlaneTensor;
 use crate::stage::scene::Scene;
 
@@ -19,6 +20,13 @@ pub struct Solid<const D: usize> {
 }
 
 pub const DISPLACEMENT: [&[&str]; 3] = [&["x"], &["y"], &["rotation"]];
+
+impl Elasticity {
+    /// Whether points turn: without shear and bending micromoduli there is nothing to turn, and two unknowns per point.
+    pub fn turns(&self, micro: &Micromoduli) -> bool {
+        !micro.is_central() || self.bending.is_some()
+    }
+}
 
 impl<const D: usize> Solid<D> {
     pub fn new(
@@ -55,7 +63,11 @@ impl<const D: usize> Solid<D> {
 
 /// k_b of each bond: E = (δ³/6) ∫ k_b n nᵀ dψ, of which eqs. 180, 181 are the case n = 2; calibrated,
 /// E = ½ Σ L k_b n nᵀ α Δv for the stencil.
-fn bending_moduli(bending: &Bending, elasticity: &Elasticity, setup: &Setup) -> Result<Vec<f64>> {
+pub fn bending_moduli(
+    bending: &Bending,
+    elasticity: &Elasticity,
+    setup: &Setup,
+) -> Result<Vec<f64>> {
     let Bending {
         first,
         second,

@@ -27,6 +27,18 @@ pub enum Parameter {
 }
 
 impl Sweep {
+    /// The model at each value, refused where there is none.
+    pub fn models(&self, model: &Molecular) -> Result<Vec<Molecular>> {
+        if self.values.is_empty() {
+            return Err(Error::setting(
+                "sweep.values",
+                "found none",
+                "list at least one value",
+            ));
+        }
+        Ok(self.values.iter().map(|v| self.apply(model, *v)).collect())
+    }
+
     fn apply(&self, model: &Molecular, value: f64) -> Molecular {
         let mut model = model.clone();
         model.sweep = None;
@@ -58,6 +70,8 @@ impl Sweep {
 struct Quiet<'a> {
     inner: &'a mut dyn Observer,
     last: Frame,
+    /// Warnings given: one that holds for all values is given once.
+    warned: &'a mut Vec<String>,
 }
 
 impl Observer for Quiet<'_> {
@@ -73,6 +87,12 @@ impl Observer for Quiet<'_> {
     fn say(&mut self, line: &str) {
         self.inner.say(line);
     }
+    fn warn(&mut self, line: &str) {
+        if !self.warned.iter().any(|w| w == line) {
+            self.inner.warn(line);
+            self.warned.push(line.to_owned());
+        }
+    }
 }
 
 pub fn run(
@@ -82,13 +102,7 @@ pub fn run(
     inputs: &Inputs,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    if sweep.values.is_empty() {
-        return Err(Error::setting(
-            "sweep.values",
-            "found none",
-            "list at least one value",
-        ));
-    }
+    let mut warned = Vec::new();
     observer.start(&scene.points(inputs)?, sweep.values.len())?;
     let (mut total, mut finished) = match observer.resume()? {
         Some(state) => kept::restore(&state)?,
@@ -110,8 +124,9 @@ pub fn run(
         let mut quiet = Quiet {
             inner: observer,
             last: Frame::default(),
+            warned: &mut warned,
         };
-        let one = super::run(scene, &sweep.apply(model, value), inputs, &mut quiet)?;
+        let one = super::solve(scene, &sweep.apply(model, value), inputs, &mut quiet)?;
         let fields = std::mem::take(&mut quiet.last.fields);
         observer.frame(&Frame {
             time: value,

@@ -245,6 +245,11 @@ fn smallest_share() -> f64 {
 }
 
 impl Time {
+    /// Whether steps may grow or shrink: settings of scenes that march.
+    pub fn adapts(&self) -> bool {
+        self.tolerance.is_some() || self.smallest_share != smallest_share()
+    }
+
     pub fn check(&self) -> Result<()> {
         let positive = self.end > 0.0 && self.step > 0.0 && self.step <= self.end;
         let usable = self.tolerance.is_none_or(|t| t.is_finite() && t > 0.0);
@@ -263,6 +268,26 @@ impl Time {
             ),
             "all must be positive and step not above end; smallest_share is between 1e-12 and 1",
         ))
+    }
+
+    /// The number of steps to the end.
+    ///
+    /// # Errors
+    /// Times that cannot be, or an end that is not a whole number of steps.
+    pub fn steps(&self) -> Result<u64> {
+        self.check()?;
+        let steps = (self.end / self.step).round() as u64;
+        if steps == 0 || ((steps as f64 * self.step - self.end) / self.end).abs() > 1e-9 {
+            return Err(Error::setting(
+                "time.end",
+                format!(
+                    "{} is not a whole number of steps of {}",
+                    self.end, self.step
+                ),
+                "change one of them",
+            ));
+        }
+        Ok(steps)
     }
 }
 

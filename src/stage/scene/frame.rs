@@ -103,6 +103,10 @@ pub trait Observer {
     fn frame(&mut self, frame: &Frame) -> Result<()>;
     /// Something worth a line: a halved step, a refactorisation.
     fn say(&mut self, line: &str);
+    /// Something that changes how the result is read.
+    fn warn(&mut self, line: &str) {
+        self.say(line);
+    }
     /// Where this very scene was stopped before, to go on from there. Asked once, after `start`.
     fn resume(&mut self) -> Result<Option<State>> {
         Ok(None)

@@ -1,6 +1,6 @@
 //! Owns the march through time: steps that halve when they do not converge, and grow back afterwards.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::solve::newton::NotConverged;
 use crate::stage::scene::conditions::Time;
 use crate::stage::scene::frame::{Frame, Observer, Output, Summary};
@@ -48,19 +48,8 @@ struct Clock {
 
 impl Clock {
     fn new(time: &Time) -> Result<Self> {
-        time.check()?;
+        let steps = time.steps()?;
         let finest = (1.0 / time.smallest_share).log2().ceil().clamp(0.0, 40.0) as u32;
-        let steps = (time.end / time.step).round() as u64;
-        if steps == 0 || ((steps as f64 * time.step - time.end) / time.end).abs() > 1e-9 {
-            return Err(Error::setting(
-                "time.end",
-                format!(
-                    "{} is not a whole number of steps of {}",
-                    time.end, time.step
-                ),
-                "change one of them",
-            ));
-        }
         Ok(Clock {
             step: time.step,
             steps,

@@ -22,6 +22,10 @@ impl<const D: usize> Front<'_, D> {
         (0..self.setup.points.len()).map(at).collect()
     }
 
+    pub fn sound_points(&self) -> usize {
+        self.sound.iter().filter(|s| **s).count()
+    }
+
     pub fn numbers(&mut self) -> Vec<(String, f64)> {
         let h = self.model.thickness;
         let stiffness = self.window.twice_energy(&self.solid.body.blocks);
@@ -62,16 +66,31 @@ impl<const D: usize> Front<'_, D> {
         let due = accepted && (last || self.scene.output.due(self.recorded, self.lambda));
         let conducting = self.conductor.as_ref().zip(self.model.conduction.as_ref());
         if let Some((conductor, conduction)) = conducting.filter(|_| accepted) {
-            let (values, unknowns) = potential(self.scene, self.model, self.setup, conductor)?;
+            let (values, unknowns) = potential(
+                self.scene,
+                self.model,
+                self.setup,
+                conductor,
+                &self.broken,
+                self.lambda,
+            )?;
             self.potential_unknowns = unknowns;
             if let Some(probes) = conduction.probes {
+                let before = self.potential_drop;
                 self.potential_drop = drop(self.setup, probes, &values);
+                if self.potential_drop.is_nan() && !before.is_nan() {
+                    observer.warn(&format!(
+                        "at a load of {:.6} the crack leaves the current no path: potential_drop is no number from there on",
+                        self.lambda
+                    ));
+                }
             }
             if due {
                 fields.push(scalar("potential", values));
             }
         }
-        if self.conductor.is_some() {
+        let probed = self.model.conduction.as_ref().and_then(|c| c.probes);
+        if probed.is_some() {
             numbers.push(("potential_drop".into(), self.potential_drop));
         }
         if due {
@@ -109,6 +128,7 @@ impl<const D: usize> Front<'_, D> {
             ),
             ("work", self.model.thickness * self.ledger.work),
             ("worst_balance_error", self.worst_balance),
+            ("sound_points", self.sound_points() as f64),
             ("solves", self.solves as f64),
             ("solve_iterations", self.iterations as f64),
             ("windows", self.windows as f64),

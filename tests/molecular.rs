@@ -5,6 +5,7 @@ mod costs;
 mod couple_stress;
 mod refusals;
 mod stopped;
+mod thermal_stress;
 mod turned;
 
 use bonepd_ct::error::Result;
@@ -567,7 +568,7 @@ fn energy_balances_while_a_strip_breaks() {
     );
     for error in kept.column("balance_error") {
         // The window's solves are converged to 1e-8 in the energy norm; a broken bond keeps 1e-9 of its stiffness.
-        assert!(error.abs() < 1e-6, "{error}");
+        assert!(error.abs() < 1e-8, "{error}");
     }
     let load = kept.column("load");
     let peak = load.iter().fold(0.0_f64, |m, v| m.max(*v));
@@ -575,7 +576,8 @@ fn energy_balances_while_a_strip_breaks() {
     assert!(*load.last().unwrap() < 1e-3 * peak, "{load:?}");
     // The crack ran straight: bonds' energies bracket G times the new area (2 mm x 20 mm x 0.5 N/mm = 20 N mm).
     let energy = number(&summary, "broken_bond_energy");
-    assert!(energy > 0.85 * 20.0 && energy < 2.0 * 20.0, "{energy}");
+    // Measured 28.4.
+    assert!(energy > 1.35 * 20.0 && energy < 1.5 * 20.0, "{energy}");
 }
 
 /// Two tips near held edges are followed with one window, which is kept while no tip leaves it: 2 windows in 134 solves.

@@ -1,10 +1,10 @@
 //! Owns an elastic body: the moduli of its bonds and what is held of it.
 
 use super::setup::Setup;
-use super::{Bending, Elasticity, Molecular};
+use super::{Bending, Elasticity, Molecular, Thermal};
 use crate::error::Result;
 use crate::physics::anisotropic::body::Body;
-use crate::physics::anisotropic::bond::{Bond, Moduli};
+use crate::physics::anisotropic::bond::{Bond, Deformation, Moduli};
 use crate::physics::anisotropic::conductivity::{Conductivity, calibration};
 use crate::physics::anisotropic::cosine::CosineLaw;
 use crate::physics::anisotropic::micromoduli::Micromoduli;
@@ -17,6 +17,7 @@ pub struct Solid<const D: usize> {
     /// Of each bond of the stencil.
     pub moduli: Vec<Moduli>,
     pub held: Vec<Option<f64>>,
+    pub thermal: Option<Thermal>,
 }
 
 pub const DISPLACEMENT: [&[&str]; 3] = [&["x"], &["y"], &["rotation"]];
@@ -57,7 +58,50 @@ impl<const D: usize> Solid<D> {
         let names: [&[&str]; D] = std::array::from_fn(|d| DISPLACEMENT[d]);
         let t = scene.time.as_ref().map_or(1.0, |time| time.end);
         let held = setup.held(scene, model, names, t, Some(tensor))?;
-        Ok(Solid { body, moduli, held })
+        Ok(Solid {
+            body,
+            moduli,
+            held,
+            thermal: elasticity.thermal,
+        })
+    }
+
+    /// Stretch and shear that bond `b` from `p` to `q` would have if it were free: the thermal strain of the mean
+    /// temperature of its ends.
+    pub fn free_strain(&self, setup: &Setup, p: usize, q: usize, b: &Bond) -> [f64; 2] {
+        let Some(thermal) = &self.thermal else {
+            return [0.0; 2];
+        };
+        let [a11, a22, a12] = thermal.expansion;
+        let [x, y] = b.n;
+        let mean = [p, q].map(|p| thermal.rise_at(setup.points.position(p)));
+        let mean = 0.5 * (mean[0] + mean[1]);
+        [
+            mean * (a11 * x * x + a22 * y * y + 2.0 * a12 * x * y),
+            mean * (a12 * (x * x - y * y) + (a22 - a11) * x * y),
+        ]
+    }
+
+    /// What bond `b` from `p` to `q` carries: its deformation less the thermal one, s - αT (eq. 176).
+    pub fn strained(
+        &self,
+        setup: &Setup,
+        x: &[[f64; D]],
+        p: usize,
+        q: usize,
+        b: &Bond,
+    ) -> Deformation {
+        let mut d = b.deformation(&x[p], &x[q]);
+        let [stretch, shear] = self.free_strain(setup, p, q, b);
+        (d.stretch, d.shear) = (d.stretch - stretch, d.shear - shear);
+        d
+    }
+}
+
+impl Thermal {
+    /// Temperature rise at `x`.
+    pub fn rise_at(&self, x: [f64; 2]) -> f64 {
+        self.rise[0] + self.rise[1] * x[0] + self.rise[2] * x[1]
     }
 }
 

@@ -3,32 +3,21 @@
 use super::equilibrium::solve;
 use super::setup::Setup;
 use super::solid::Solid;
-use super::{Elasticity, Molecular, Thermal};
+use super::{Elasticity, Molecular};
 use crate::error::Result;
 use crate::physics::anisotropic::tensor::PlaneTensor;
 use crate::stage::scene::Scene;
 use crate::stage::scene::frame::{Field, Frame, Observer, Summary, Values};
 
-/// Forces of thermal strain: each bond pushes with its stiffness times the stretch (and shear) that the mean
-/// temperature rise of its ends would give it free (eq. 176 for an isotropic expansion).
-pub fn thermal_force<const D: usize>(
-    solid: &Solid<D>,
-    setup: &Setup,
-    thermal: &Thermal,
-) -> Vec<[f64; D]> {
-    let [a11, a22, a12] = thermal.expansion;
-    let rise = |p: usize| {
-        let x = setup.points.position(p);
-        thermal.rise[0] + thermal.rise[1] * x[0] + thermal.rise[2] * x[1]
-    };
+/// Forces of thermal strain: each bond pushes with its stiffness times the stretch (and shear) that it would have if
+/// free (eq. 176).
+pub fn thermal_force<const D: usize>(solid: &Solid<D>, setup: &Setup) -> Vec<[f64; D]> {
     let row = |p: usize| {
         let mut force = [0.0; D];
         for (q, kind, factor) in solid.body.row(p) {
             let (b, k) = (&setup.bonds[kind], &solid.moduli[kind]);
             let [x, y] = b.n;
-            let mean = 0.5 * (rise(p) + rise(q));
-            let stretch = mean * (a11 * x * x + a22 * y * y + 2.0 * a12 * x * y);
-            let shear = mean * (a12 * (x * x - y * y) + (a22 - a11) * x * y);
+            let [stretch, shear] = solid.free_strain(setup, p, q, b);
             let weight = factor * b.volume_mm2 * setup.cell;
             let (axial, lateral) = (weight * k.axial * stretch, weight * k.shear * shear);
             force[0] -= axial * x - lateral * y;
@@ -90,19 +79,25 @@ pub fn deform<const D: usize>(
     let names: [&[&str]; D] = std::array::from_fn(|d| super::solid::DISPLACEMENT[d]);
     let t = scene.time.as_ref().map_or(1.0, |time| time.end);
     let mut force = loads(scene, model, setup, names, t)?;
-    if let Some(thermal) = &elasticity.thermal {
-        for (f, extra) in force.iter_mut().zip(thermal_force(&solid, setup, thermal)) {
+    if elasticity.thermal.is_some() {
+        for (f, extra) in force.iter_mut().zip(thermal_force(&solid, setup)) {
             f.iter_mut().zip(extra).for_each(|(f, e)| *f += e);
         }
     }
     let (x, unknowns) = solve(&solid.body, &setup.points, &solid.held, &force)?;
     let energy = energy_density(&solid, setup, &x);
-    let mut numbers = vec![("energy".to_owned(), model.thickness * solid.body.energy(&x))];
-    if let Some(middle) = full_point(setup) {
+    let total = model.thickness * setup.cell * energy.iter().sum::<f64>();
+    let mut numbers = vec![("energy".to_owned(), total)];
+    let middle = full_point(setup);
+    if let Some(middle) = middle {
         numbers.push(("energy_density_inside".into(), energy[middle]));
     }
     if let Some([e11, e22, shear]) = strain_of(model) {
-        let exact = tensor.energy_density([e11, e22, shear]);
+        let [a11, a22, a12] = match (&elasticity.thermal, middle) {
+            (Some(t), Some(p)) => t.expansion.map(|a| a * t.rise_at(setup.points.position(p))),
+            _ => [0.0; 3],
+        };
+        let exact = tensor.energy_density([e11 - a11, e22 - a22, shear - 2.0 * a12]);
         numbers.push(("energy_density_local".into(), exact));
     }
     let mut fields = vec![displacement(&x, 1.0)];
@@ -138,7 +133,7 @@ fn full_point(setup: &Setup) -> Option<usize> {
     (0..n).map(|k| (n / 2 + k) % n).find(full)
 }
 
-/// W at each point (eq. 11).
+/// W at each point (eq. 11), of what strains the bonds beyond their thermal strain.
 fn energy_density<const D: usize>(solid: &Solid<D>, setup: &Setup, x: &[[f64; D]]) -> Vec<f64> {
     let density = |p: usize| {
         solid
@@ -146,7 +141,7 @@ fn energy_density<const D: usize>(solid: &Solid<D>, setup: &Setup, x: &[[f64; D]
             .row(p)
             .map(|(q, kind, factor)| {
                 let b = &setup.bonds[kind];
-                let w = b.energy(&solid.moduli[kind], &b.deformation(&x[p], &x[q]));
+                let w = b.energy(&solid.moduli[kind], &solid.strained(setup, x, p, q, b));
                 0.5 * factor * w * b.volume_mm2
             })
             .sum()
@@ -161,7 +156,7 @@ pub fn stress<const D: usize>(solid: &Solid<D>, setup: &Setup, x: &[[f64; D]]) -
         let mut s = [0.0; 3];
         for (q, kind, factor) in solid.body.row(p) {
             let (b, k) = (&setup.bonds[kind], &solid.moduli[kind]);
-            let d = b.deformation(&x[p], &x[q]);
+            let d = solid.strained(setup, x, p, q, b);
             let weight = 0.5 * factor * b.volume_mm2 * b.length_mm;
             let (axial, lateral) = (weight * k.axial * d.stretch, weight * k.shear * d.shear);
             let [nx, ny] = b.n;

@@ -5,12 +5,12 @@ use super::equilibrium::factorise;
 use super::setup::Setup;
 use super::solid::Solid;
 use super::steady::{displacement, scalar, summary};
-use crate::error::Result;
-use crate::solve::lanczos::{Mode, lowest};
+use crate::error::{Error, Result};
+use crate::solve::lanczos::{Found, Mode, lowest};
 use crate::stage::scene::frame::{Frame, Observer, Summary};
 
 /// Modes, their shapes at every point, and the number of unknowns.
-type Found<const D: usize> = (Vec<Mode>, Vec<Vec<[f64; D]>>, usize);
+type Shaped<const D: usize> = (Found, Vec<Vec<[f64; D]>>, usize);
 
 /// Frequencies and shapes of the lowest `vibration.modes` modes, rigid ones included. The rotary inertia per volume is
 /// that of a cell, ρ Δ²/6 (the text leaves it open; it vanishes with the grid as it must in a Cauchy body).
@@ -18,8 +18,15 @@ pub fn modes<const D: usize>(
     solid: &Solid<D>,
     vibration: &Vibration,
     setup: &Setup,
-) -> Result<Found<D>> {
+) -> Result<Shaped<D>> {
     let Vibration { density, modes } = *vibration;
+    if solid.held.iter().all(Option::is_some) {
+        return Err(Error::setting(
+            "hold",
+            "everything is held, so that nothing vibrates",
+            "hold fewer points or components",
+        ));
+    }
     let cell = density * setup.cell;
     let inertia = cell * setup.cell / 6.0;
     let mass_of = |v: usize| if v % D == 2 { inertia } else { cell };
@@ -38,6 +45,7 @@ pub fn modes<const D: usize>(
     let found = lowest(modes, &mass, shift, |x| factorised.llt.solve(x));
     let still: Vec<Option<f64>> = solid.held.iter().map(|h| h.map(|_| 0.0)).collect();
     let shapes = found
+        .modes
         .iter()
         .map(|m| factorised.expand(&m.vector, &still))
         .collect();
@@ -58,7 +66,17 @@ pub fn run<const D: usize>(
     observer.start(&setup.points, vibration.modes)?;
     let (found, shapes, unknowns) = modes(&solid, vibration, setup)?;
     let mut numbers = Vec::new();
-    for (k, (mode, shape)) in found.iter().zip(&shapes).enumerate() {
+    let count = found.modes.len();
+    if !found.settled {
+        observer.say("the modes did not settle: ask for fewer, or take them with a grain of salt");
+    }
+    if count < vibration.modes {
+        observer.say(&format!(
+            "{count} modes found of the {} asked for: there are {unknowns} unknowns",
+            vibration.modes
+        ));
+    }
+    for (k, (mode, shape)) in found.modes.iter().zip(&shapes).enumerate() {
         let f = frequency(mode);
         let largest = shape.iter().fold(0.0_f64, |m, u| m.max(u[0].hypot(u[1])));
         let size: Vec<f64> = shape.iter().map(|u| u[0].hypot(u[1]) / largest).collect();
@@ -73,5 +91,7 @@ pub fn run<const D: usize>(
         numbers.push((format!("frequency_{}", k + 1), f));
     }
     let stored = solid.body.bond_values();
-    Ok(summary(setup, unknowns, stored, found.len(), numbers))
+    let mut summary = summary(setup, unknowns, stored, count, numbers);
+    summary.converged = found.settled;
+    Ok(summary)
 }

@@ -37,11 +37,14 @@ pub fn mechanisms(
 fn largest_eigenvalue(a: &Sparse) -> f64 {
     let ones = vec![1.0; a.n()];
     let mut y = vec![0.0; a.n()];
-    let modes = lowest(1, &ones, 0.0, |x| {
+    let found = lowest(1, &ones, 0.0, |x| {
         a.apply(x, &mut y);
         x.copy_from_slice(&y);
     });
-    modes.first().map_or(1.0, |mode| mode.eigenvalue.recip())
+    found
+        .modes
+        .first()
+        .map_or(1.0, |mode| mode.eigenvalue.recip())
 }
 
 /// Rigid motions of the whole that move no held component.

@@ -128,8 +128,11 @@ impl DirectLlt {
     /// # Panics
     /// Before the first [`DirectLlt::factorize`].
     pub fn solve(&mut self, x: &mut [f64]) {
-        assert!(!self.numeric.is_empty(), "factorised first");
         let n = x.len();
+        if n == 0 {
+            return;
+        }
+        assert!(!self.numeric.is_empty(), "factorised first");
         LltRef::new(&self.symbolic, &self.numeric).solve_in_place_with_conj(
             Conj::No,
             MatMut::from_column_major_slice_mut(x, n, 1),

@@ -94,7 +94,7 @@ fn stopped_fracture_goes_on_to_the_same_end() {
     let text = text.replace("[[-20, 0, -5, 0]]", "[[-20, 0, -5, 0], [5, 3, 20, 3]]");
     let states = goes_on_to_the_same_end(&(text + "\n        window_points = 150"), 9);
     let count = |s: &State| {
-        let sums = s.array("fracture.sums", 16).unwrap();
+        let sums = s.array("fracture.sums", 17).unwrap();
         let broken = s.find("fracture.order").unwrap().len() / 2;
         (sums[11], sums[15] as usize, broken)
     };

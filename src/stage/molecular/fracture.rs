@@ -67,6 +67,8 @@ struct Front<'a, const D: usize> {
     solves: usize,
     iterations: usize,
     windows: usize,
+    /// Solves of a window that did not reach equilibrium; a new one was put after each.
+    unsettled: usize,
     /// As of the last accepted load.
     potential_drop: f64,
     potential_unknowns: usize,
@@ -106,6 +108,12 @@ pub fn run<const D: usize>(
         let last = front.step == steps || front.crack.stopped;
         front.record(observer, true, last)?;
         (front.step, front.events) = (front.step + 1, 0);
+    }
+    if front.unsettled > 0 {
+        observer.say(&format!(
+            "{} of {} solves about the crack front did not converge: take a smaller batch",
+            front.unsettled, front.solves
+        ));
     }
     Ok(front.summary(steps))
 }
@@ -201,7 +209,10 @@ impl<const D: usize> Front<'_, D> {
         self.iterations += cut.iterations;
         self.solves += 1;
         self.stale = true;
-        if leaves {
+        if !cut.converged {
+            self.unsettled += 1;
+        }
+        if leaves || !cut.converged {
             self.look_and_move()?;
         }
         Ok(())

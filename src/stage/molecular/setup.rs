@@ -236,8 +236,9 @@ fn known_values<const D: usize>(
 }
 
 /// Whether the bond from `a` to `b` crosses the segment; through its very end it does not. A point on the segment belongs
-/// to its left side.
+/// to its left side. The same from either end, to the last bit.
 fn crosses(segment: &[f64; 4], a: [f64; 2], b: [f64; 2]) -> bool {
+    let [a, b] = if a <= b { [a, b] } else { [b, a] };
     // Shortened by a trifle, so that rounding does not decide on bonds through the ends.
     let at = |share: f64| [0, 1].map(|i| segment[i] + share * (segment[i + 2] - segment[i]));
     let (c, d) = (at(1e-9), at(1.0 - 1e-9));
@@ -262,5 +263,19 @@ mod tests {
         assert!(!crosses(&crack, [-1.0, -1.0], [0.0, 0.0]));
         assert!(!crosses(&crack, [1.0, 2.0], [2.0, 1.0]));
         assert!(!crosses(&crack, [0.0, 2.0], [2.0, 0.0]));
+    }
+
+    /// Points that a crack passes by a rounding error: a bond is cut from both of its ends or from none.
+    #[test]
+    fn a_bond_is_cut_from_both_ends_or_from_none() {
+        let position = |i: i32| -3.0 + (f64::from(i) + 0.5) * 0.3;
+        let crack = [position(1), position(4), position(10), position(10)];
+        for (i, j) in (0..20).flat_map(|i| (0..20).map(move |j| (i, j))) {
+            for (u, v) in (-5..=5).flat_map(|u| (-5..=5).map(move |v| (u, v))) {
+                let a = [position(i), position(j)];
+                let b = [position(i + u), position(j + v)];
+                assert_eq!(crosses(&crack, a, b), crosses(&crack, b, a), "{a:?} {b:?}");
+            }
+        }
     }
 }

@@ -22,6 +22,8 @@ pub struct Cut {
     pub iterations: usize,
     /// Energy the remaining body gave up while it moved to its new equilibrium.
     pub relaxed: f64,
+    /// Whether that equilibrium was reached.
+    pub converged: bool,
 }
 
 /// Equilibrium under unit load of a body some of whose bonds are broken after its factorisation.
@@ -195,6 +197,7 @@ impl<const D: usize> Window<D> {
         Cut {
             iterations: info.iterations,
             relaxed,
+            converged: info.converged,
         }
     }
 

@@ -32,6 +32,7 @@ impl<const D: usize> Front<'_, D> {
             self.far,
             f64::from(u8::from(self.stale)),
             self.before_window as f64,
+            self.unsettled as f64,
         ];
         state.put("fracture.sums", sums);
         let numbers = |(p, slot): &(usize, usize)| [*p as f64, *slot as f64];
@@ -43,7 +44,7 @@ impl<const D: usize> Front<'_, D> {
 
     /// Goes back to a kept state.
     pub fn restore(&mut self, state: &State) -> Result<()> {
-        let s = state.array("fracture.sums", 16)?;
+        let s = state.array("fracture.sums", 17)?;
         let order = state.find("fracture.order").unwrap_or_default();
         let (pairs, _) = order.as_chunks::<2>();
         let (before, since) = pairs.split_at(s[15] as usize);
@@ -68,6 +69,7 @@ impl<const D: usize> Front<'_, D> {
         (self.solves, self.iterations, self.windows) =
             (s[9] as usize, s[10] as usize, s[11] as usize);
         (self.potential_drop, self.far, self.stale) = (s[12], s[13], s[14] != 0.0);
+        self.unsettled = s[16] as usize;
         Ok(())
     }
 

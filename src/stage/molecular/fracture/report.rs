@@ -148,6 +148,7 @@ impl<const D: usize> Front<'_, D> {
         ];
         let stored = self.broken.len() + bodies.into_iter().flatten().sum::<usize>();
         let mut summary = summary(self.setup, self.window.unknowns(), stored, steps, numbers);
+        summary.converged = self.unsettled == 0;
         if self.crack.stopped {
             summary.stopped = Some("the crack reached the stop region".into());
         }

@@ -205,6 +205,7 @@ impl<'a, const D: usize> Front<'a, D> {
             solves: 0,
             iterations: 0,
             windows: 0,
+            unsettled: 0,
             potential_drop: 0.0,
             potential_unknowns: 0,
         };

@@ -5,8 +5,8 @@ use crate::error::Result;
 use crate::stage::molecular::window::Window;
 use rayon::prelude::*;
 
-/// Dense points of a window about each seed reach this many spacings.
-const REACH: f64 = 13.0;
+/// Dense points of a window about each seed reach this many spacings, or one farther than bonds do.
+const REACH: i32 = 13;
 
 impl<const D: usize> Front<'_, D> {
     /// Energy over critical energy of a bond under unit load; 0 where it cannot break.
@@ -99,10 +99,10 @@ impl<const D: usize> Front<'_, D> {
     fn cover(&self, seed: usize, taken: &mut [bool], chosen: &mut Vec<usize>) {
         let points = &self.setup.points;
         let [i, j] = points.cell(seed);
-        let reach = REACH.ceil() as i32;
+        let reach = REACH.max(self.setup.family.stencil.reach() + 1);
         for dj in -reach..=reach {
             for di in -reach..=reach {
-                let near = f64::from(di * di + dj * dj) <= REACH * REACH;
+                let near = di * di + dj * dj <= reach * reach;
                 let Some(p) = points.at([i + di, j + dj]).filter(|_| near) else {
                     continue;
                 };

@@ -224,14 +224,6 @@ impl Observer for Writer<'_> {
             fields: Vec::new(),
             ..frame.clone()
         };
-        // A scene that stops tells of its last good state once more, with fields.
-        if self
-            .history
-            .last()
-            .is_some_and(|last| last.time == row.time)
-        {
-            self.history.pop();
-        }
         self.history.push(row);
         if !frame.fields.is_empty() {
             self.write_history()?;
@@ -239,6 +231,17 @@ impl Observer for Writer<'_> {
         }
         self.bar.inc(1);
         Ok(())
+    }
+
+    /// A scene that stops tells of its last good state once more.
+    fn again(&mut self, frame: &Frame) -> Result<()> {
+        if self.history.last().is_some_and(|f| f.time == frame.time) {
+            self.history.pop();
+        }
+        if self.maps.last().is_some_and(|(t, _)| *t == frame.time) {
+            self.maps.pop();
+        }
+        self.frame(frame)
     }
 
     fn say(&mut self, line: &str) {

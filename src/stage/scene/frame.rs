@@ -101,6 +101,10 @@ pub trait Observer {
     /// Before the first state. `steps` is the number of steps foreseen.
     fn start(&mut self, points: &Points, steps: usize) -> Result<()>;
     fn frame(&mut self, frame: &Frame) -> Result<()>;
+    /// A frame that was told of before, of the same time, now with its fields.
+    fn again(&mut self, frame: &Frame) -> Result<()> {
+        self.frame(frame)
+    }
     /// Something worth a line: a halved step, a refactorisation.
     fn say(&mut self, line: &str);
     /// Something that changes how the result is read.

@@ -216,7 +216,7 @@ pub fn march(
                 observer.say(&format!("t = {now:.6}: {why}; step halved to {length:.3e}"));
             }
             Err(why) => {
-                observer.frame(&model.frame(before, true))?;
+                observer.again(&model.frame(before, true))?;
                 summary.stopped = Some(format!(
                     "at t = {before:.6} no step down to {:.3e} converged: {why}; the last good state is written",
                     now - before

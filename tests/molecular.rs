@@ -4,6 +4,7 @@ mod breaking;
 mod costs;
 mod couple_stress;
 mod refusals;
+mod heat;
 mod history;
 mod limits;
 mod repeated_modes;

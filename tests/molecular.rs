@@ -4,6 +4,7 @@ mod breaking;
 mod costs;
 mod couple_stress;
 mod refusals;
+mod fields;
 mod heat;
 mod history;
 mod limits;

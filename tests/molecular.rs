@@ -3,11 +3,11 @@
 mod breaking;
 mod costs;
 mod couple_stress;
-mod refusals;
 mod fields;
 mod heat;
 mod history;
 mod limits;
+mod refusals;
 mod repeated_modes;
 mod stopped;
 mod thermal_stress;

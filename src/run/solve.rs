@@ -64,6 +64,7 @@ pub fn solve(
         {
             Some(row) => row,
             None if session.dry_run => {
+                estimate::refuse_what_does_not_fit(&specimen, job.case(), params)?;
                 let mib = estimate::of_solve_mib(&specimen, job.case(), params)?;
                 session.say(format!(
                     "would solve {} {} mm, about {mib:.0} MiB",

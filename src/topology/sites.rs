@@ -61,7 +61,7 @@ impl Sites {
         drop(weights);
         let mut indices = Vec::with_capacity(kept.len());
         indices.extend(kept.iter().map(|c| frame.indices(c)));
-        let row_step = frame.structure.row_step();
+        let row_step = frame.structure.steps_per_lp() as i32;
         let follows = |s: usize| {
             let [i, j, k] = indices[s];
             s > 0 && indices[s - 1] == [i - row_step, j, k]

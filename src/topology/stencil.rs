@@ -85,14 +85,9 @@ impl Structure {
         }
     }
 
-    /// Grid steps per lattice parameter.
+    /// Grid steps per lattice parameter, which is as far apart as places for sites in a row along an axis are.
     pub fn steps_per_lp(self) -> f64 {
         if self == Structure::Sc { 1.0 } else { 2.0 }
-    }
-
-    /// Grid steps between places for sites in a row along an axis.
-    pub fn row_step(self) -> i32 {
-        if self == Structure::Sc { 1 } else { 2 }
     }
 
     /// Whether a site may sit at these grid indices; `(0, 0, 0)` always is a site.
@@ -172,7 +167,7 @@ mod tests {
                     let [a, b] = [stencil.direction(pair[0]), stencil.direction(pair[1])];
                     assert_eq!(
                         [b[0] - a[0], b[1] - a[1], b[2] - a[2]],
-                        [s.row_step(), 0, 0]
+                        [s.steps_per_lp() as i32, 0, 0]
                     );
                 }
             }

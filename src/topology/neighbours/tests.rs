@@ -42,7 +42,7 @@ fn what_goes_in_comes_out() {
                 let inside = (0..3).all(|a| (0..n[a]).contains(&at[a]));
                 inside.then(|| number[((at[2] * n[1] + at[1]) * n[0] + at[0]) as usize])?
             };
-            let step = structure.row_step();
+            let step = structure.steps_per_lp() as i32;
             let follows = |s: usize| {
                 let [i, j, k] = sites[s];
                 s > 0 && sites[s - 1] == [i - step, j, k]

@@ -5,31 +5,40 @@
 //!
 //! | layer | module | owns |
 //! |---|---|---|
-//! | 0 | [`error`], [`par`], [`simd`] | what is told to the person at the keyboard; vector sums that repeat on any number of threads; eight lanes chosen at run time |
+//! | 0 | [`error`], [`par`], [`simd`] | messages to the person at the keyboard; vector sums that repeat on any number of threads; eight lanes chosen at run time |
 //! | 1 | [`grid`] | indices, voxels, millimetres |
-//! | 2 | [`volume`] | values on a grid; the segmented specimen |
-//! | 3 | [`mask`] | turning and resampling, smoothing, thresholds, volumes of interest, connected components |
-//! | 4 | [`topology`] | who touches whom: lattice sites, voxel meshes, families of points |
+//! | 2 | [`volume`], [`io`] | values on a grid and the segmented specimen; files written whole, tables |
+//! | 3 | [`image`], [`mask`] | scan readers, one format a file; turning and resampling, smoothing, thresholds, volumes of interest, connected components |
+//! | 4 | [`discretisation`] | who touches whom, without any moduli: lattices, voxel meshes, points of a plane |
 //! | 5 | [`operator`] | the seam: what a solver may know of a model |
-//! | 6 | [`physics`] and [`solve`] | energies and forces; algorithms. Neither imports the other |
-//! | 7 | [`measure`] | numbers drawn from a solution or a mask, as plain records |
-//! | 8 | [`stage`] | one step of the pipeline each: parameters in, plain result out |
-//! | 9 | [`recipe`] | all stages' parameters in one file |
-//! | 10 | [`io`] | files: one format a file |
-//! | 11 | [`run`] | recipes on real scans: disk, clock, resuming, isolation of failures |
+//! | 6 | [`physics`] and [`solver`] | energies and forces; algorithms. Neither imports the other |
+//! | 7 | [`measure`] and [`result`] | numbers of a mask or a field; what rows of results say together |
+//! | 8 | [`pipeline`], [`scene`] and [`report`] | steps from grey values to an apparent modulus; two-dimensional scenes; rows to tables, figures and pages. None imports another |
+//! | 9 | [`recipe`], [`draw`] | all steps' settings in one file; pictures of masks and of plane fields |
+//! | 10 | [`record`], [`export`] | results kept on disk; models and fields for other programs |
+//! | 11 | [`command`] | one verb of the program each: paths and settings in, files out |
+//! | 12 | [`cohort`] | one recipe over many scans, each on its own |
 
+pub mod cohort;
+pub mod command;
+pub mod discretisation;
+pub mod draw;
 pub mod error;
+pub mod export;
 pub mod grid;
+pub mod image;
 pub mod io;
 pub mod mask;
 pub mod measure;
 pub mod operator;
 pub mod par;
 pub mod physics;
+pub mod pipeline;
 pub mod recipe;
-pub mod run;
+pub mod record;
+pub mod report;
+pub mod result;
+pub mod scene;
 pub mod simd;
-pub mod solve;
-pub mod stage;
-pub mod topology;
+pub mod solver;
 pub mod volume;

@@ -2,11 +2,11 @@
 
 mod cli;
 
-use bonepd_ct::run::Outcome;
+use bonepd_ct::command::Outcome;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    bonepd_ct::run::host::give_freed_memory_back();
+    bonepd_ct::command::host::give_freed_memory_back();
     match cli::run() {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::NotConverged) => {

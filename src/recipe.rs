@@ -1,10 +1,10 @@
 //! Owns the recipe file: all stages' settings in TOML, unknown keys refused with the nearest known one named.
 
 use crate::error::{Error, Result};
-use crate::stage::lattice::LatticeParams;
-use crate::stage::report::ReportParams;
-use crate::stage::segment::SegmentParams;
-use crate::stage::solve::SolveParams;
+use crate::pipeline::apparent::SolveParams;
+use crate::pipeline::lattice::LatticeParams;
+use crate::pipeline::segment::SegmentParams;
+use crate::report::ReportParams;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;

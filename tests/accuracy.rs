@@ -3,7 +3,7 @@
 use crate::cli::run;
 use crate::segment::shared_stack;
 use bonepd_ct::io::table;
-use bonepd_ct::measure::row::Row;
+use bonepd_ct::result::row::Row;
 use std::path::Path;
 
 /// A phantom of 1.2 mm with struts of 0.16 mm, segmented into `dir`.

@@ -3,10 +3,10 @@
 use crate::cli::run;
 use crate::segment::shared_stack;
 use bonepd_ct::grid::{Axis, Grid};
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build};
-use bonepd_ct::stage::solve::lattice::solve_lattice;
-use bonepd_ct::stage::solve::solved::Solved;
-use bonepd_ct::stage::solve::{Load, SolveParams};
+use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
+use bonepd_ct::pipeline::apparent::solved::Solved;
+use bonepd_ct::pipeline::apparent::{Load, SolveParams};
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build};
 use bonepd_ct::volume::{Specimen, Volume};
 
 /// Two slanted struts with a plate between them: 24³ voxels of 0.05 mm.
@@ -181,7 +181,7 @@ fn the_real_stack_gives_the_reference_moduli() {
     assert_eq!(run(&segment).0, 0);
     let (code, _, stderr) = run(&["solve", out]);
     assert_eq!(code, 0, "{stderr}");
-    let rows: Vec<bonepd_ct::measure::row::Row> =
+    let rows: Vec<bonepd_ct::result::row::Row> =
         bonepd_ct::io::table::read(&dir.path().join("results.csv")).unwrap();
     // An independent, plain implementation, converged to a residual of 1e-8 (LHDL stack, SC, E 1000 MPa, ν 0.3).
     // Sites agree exactly; moduli were met to 0.4 % (algebraic tolerance 0.1 %); the bound asked for is 1 %.
@@ -196,7 +196,7 @@ fn the_real_stack_gives_the_reference_moduli() {
             ("floppy", floppy_mpa, floppy_sites),
             ("firm", firm_mpa, firm_sites),
         ] {
-            let is_it = |r: &&bonepd_ct::measure::row::Row| {
+            let is_it = |r: &&bonepd_ct::result::row::Row| {
                 r.boundary.as_deref() == Some(boundary) && r.lp_mm == lp
             };
             let row = rows.iter().find(is_it).unwrap();

@@ -2,8 +2,9 @@
 
 use crate::cli::{bonepd, run};
 use bonepd_ct::grid::Grid;
-use bonepd_ct::io::{nifti, table};
-use bonepd_ct::measure::row::Row;
+use bonepd_ct::image::nifti;
+use bonepd_ct::io::table;
+use bonepd_ct::result::row::Row;
 use bonepd_ct::volume::Volume;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,11 +1,11 @@
 //! Exported lattices say what they hold: counts in the headers are counts of lines.
 
+use bonepd_ct::export::{inp, lammps, vtk};
 use bonepd_ct::grid::Axis;
-use bonepd_ct::io::{inp, lammps, vtk};
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
 use bonepd_ct::physics::material::{Label, Law, Material};
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build, build_of};
-use bonepd_ct::stage::solve::{Method, SolveParams};
+use bonepd_ct::pipeline::apparent::{Method, SolveParams};
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build, build_of};
 use bonepd_ct::volume::{Specimen, Volume};
 
 fn case(boundary: Boundary) -> Case {
@@ -251,7 +251,7 @@ fn lammps_data_are_told_to_be_of_a_quarter() {
     let dir = tempfile::tempdir().unwrap();
     let (scan, out) = (dir.path().join("s.nii"), dir.path().join("out"));
     let grid = Grid::new([8; 3], [0.05; 3]);
-    bonepd_ct::io::nifti::write(&scan, &Volume::from_vec(grid, vec![9i16; 512])).unwrap();
+    bonepd_ct::image::nifti::write(&scan, &Volume::from_vec(grid, vec![9i16; 512])).unwrap();
     let [scan, out] = [&scan, &out].map(|path| path.to_str().unwrap());
     assert_eq!(
         crate::cli::run(&["segment", scan, "-o", out, "--lower", "1"]).0,

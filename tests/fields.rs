@@ -2,14 +2,15 @@
 
 use crate::cli::run;
 use bonepd_ct::grid::Grid;
-use bonepd_ct::io::{nifti, scan, table};
+use bonepd_ct::image::{nifti, scan};
+use bonepd_ct::io::table;
 use bonepd_ct::measure::pistoia::Pistoia;
-use bonepd_ct::measure::row::Row;
 use bonepd_ct::physics::material::{Label, Law, Material};
-use bonepd_ct::stage::lattice::{Boundary, Case, LatticeParams, Structure};
-use bonepd_ct::stage::solve::fields::{Field, Recorded};
-use bonepd_ct::stage::solve::voxel_fe::solve_recorded;
-use bonepd_ct::stage::solve::{Method, SolveParams, lattice};
+use bonepd_ct::pipeline::apparent::fields::{Field, Recorded};
+use bonepd_ct::pipeline::apparent::voxel_fe::solve_recorded;
+use bonepd_ct::pipeline::apparent::{Method, SolveParams, lattice};
+use bonepd_ct::pipeline::lattice::{Boundary, Case, LatticeParams, Structure};
+use bonepd_ct::result::row::Row;
 use bonepd_ct::volume::{Specimen, Volume};
 
 /// A solid block, its upper half another label.

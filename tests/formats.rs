@@ -1,7 +1,7 @@
 //! Every reader on a small sound file of its format, written by hand or by another crate.
 
 use bonepd_ct::grid::Grid;
-use bonepd_ct::io::{nifti, scan, tiff};
+use bonepd_ct::image::{nifti, scan, tiff};
 use bonepd_ct::volume::Volume;
 
 pub fn volume() -> Volume<i16> {

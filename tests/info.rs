@@ -3,7 +3,7 @@
 use crate::cli::run;
 use crate::formats::sound_files;
 use bonepd_ct::grid::Grid;
-use bonepd_ct::io::{nifti, scan};
+use bonepd_ct::image::{nifti, scan};
 use bonepd_ct::volume::Volume;
 use serde_json::Value;
 use std::path::Path;

@@ -1,5 +1,6 @@
 //! The table of three-dimensional models, and the laws every one of them must obey. A new physics is one row.
 
+use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::operator::Operator;
 use bonepd_ct::operator::held::{Constrained, Held};
@@ -9,10 +10,9 @@ use bonepd_ct::physics::hex8::element::{Integration, stiffness};
 use bonepd_ct::physics::hex8::graded::Graded;
 use bonepd_ct::physics::lattice::pieces::GradedLattice;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-use bonepd_ct::solve::cg::{CgParams, ENERGY_ALONE, minimise};
-use bonepd_ct::solve::jacobi::Jacobi;
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build, build_pieces};
-use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build, build_pieces};
+use bonepd_ct::solver::cg::jacobi::Jacobi;
+use bonepd_ct::solver::cg::{CgParams, ENERGY_ALONE, minimise};
 use bonepd_ct::volume::{Specimen, Volume};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

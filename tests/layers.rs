@@ -154,7 +154,7 @@ fn the_table_is_the_one_in_the_crates_root() {
 
 #[test]
 fn upward_and_sideways_imports_are_seen() {
-    let planted = "// use crate::run::x;\nuse crate::{grid::Grid, io::{a, b}};\nlet x = crate::physics::E;\nuse other_crate::run;";
+    let planted = "// use crate::command::x;\nuse crate::{grid::Grid, io::{a, b}};\nlet x = crate::physics::E;\nuse other_crate::run;";
     assert_eq!(imports(planted), ["grid", "io", "physics"]);
     assert!(violation("solve", "grid").is_none());
     assert!(violation("solve", "solve").is_none());

@@ -13,10 +13,11 @@ mod stopped;
 mod thermal_stress;
 mod turned;
 
+use bonepd_ct::discretisation::plane::Points;
 use bonepd_ct::error::Result;
-use bonepd_ct::stage::scene::frame::{Frame, Observer, Summary, Values};
-use bonepd_ct::stage::scene::{Inputs, Scene, run};
-use bonepd_ct::topology::plane::Points;
+use bonepd_ct::scene::frame::{Frame, Observer, Summary, Values};
+use bonepd_ct::scene::setting::Inputs;
+use bonepd_ct::scene::{Scene, run};
 use std::path::Path;
 
 /// Keeps what a scene reports.
@@ -237,7 +238,8 @@ fn crack_tip(n: f64, m: f64, k: [f64; 2], correct: bool) -> (Summary, Kept) {
 /// Relative error of the displacements over the free points, over those beyond the horizon, and the largest over the
 /// largest displacement.
 fn crack_tip_errors(kept: &Kept, n: f64, m: f64, k: [f64; 2]) -> [f64; 3] {
-    use bonepd_ct::physics::anisotropic::{crack_tip::CrackTip, tensor::PlaneTensor};
+    use bonepd_ct::physics::continuum_molecular::crack_tip::CrackTip;
+    use bonepd_ct::physics::continuum_molecular::tensor::PlaneTensor;
     let c = PlaneTensor::from_moduli([1.0, 0.8, 0.2, 1.0 / 3.0, 0.1, 1.0 / 6.0]).unwrap();
     let tip = CrackTip::new(&c);
     let (dx, u) = (1.0 / n, kept.vector("displacement"));
@@ -361,9 +363,9 @@ fn linear_temperatures_bend_a_free_body_without_stress() {
 /// Cooling of an insulated square: a cosine decays as exp(-π²Dt/L²), calibrated stencil, surfaces corrected.
 #[test]
 fn transient_heat_follows_its_series() {
-    use bonepd_ct::stage::molecular::conduction::Transient;
-    use bonepd_ct::stage::molecular::setup::Setup;
-    use bonepd_ct::stage::scene::Physics;
+    use bonepd_ct::scene::Physics;
+    use bonepd_ct::scene::continuum_molecular::conduction::Transient;
+    use bonepd_ct::scene::continuum_molecular::setup::Setup;
     let text = "title = 'square'
         [geometry.rectangle]
         size = [1, 0.2]
@@ -696,7 +698,8 @@ fn a_scanned_stiffness_is_cut_to_the_scenes_plane() {
 /// and cut; energy of a stretched block follows its plane modulus.
 #[test]
 fn a_scene_file_reads_its_stiffness_from_a_file() {
-    use bonepd_ct::run::{scene::scene, session::Session};
+    use bonepd_ct::command::scene::scene;
+    use bonepd_ct::command::session::Session;
     let folder = tempfile::tempdir().unwrap();
     let quiet = Session {
         quiet: true,
@@ -731,8 +734,8 @@ fn a_scene_file_reads_its_stiffness_from_a_file() {
 /// stores what it stores with the six plane moduli that follow from the file's compliance.
 #[test]
 fn a_scan_becomes_the_tensor_of_a_scene() {
-    use bonepd_ct::io::stiffness;
     use bonepd_ct::measure::stiffness::compliance;
+    use bonepd_ct::record::stiffness;
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let program = |line: &str, paths: &[&str]| {

@@ -2,16 +2,16 @@
 //! displaced on its surface by `u = ∇φ`, `φ = e^{cz} cos ax cos ay`, `c = √2 a`. φ is harmonic, so u meets Navier's
 //! equation for any material; it is smooth and nowhere affine.
 
+use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::operator::Operator;
 use bonepd_ct::operator::held::{Constrained, Held};
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::Integration;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-use bonepd_ct::solve::cg::{CgParams, ENERGY_ALONE, minimise};
-use bonepd_ct::solve::jacobi::Jacobi;
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build};
-use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build};
+use bonepd_ct::solver::cg::jacobi::Jacobi;
+use bonepd_ct::solver::cg::{CgParams, ENERGY_ALONE, minimise};
 use bonepd_ct::volume::{Specimen, Volume};
 
 const A: f64 = 2.0;

@@ -1,11 +1,11 @@
 //! Patch tests: a fully bonded lattice is the isotropic solid, and an affine field is in equilibrium.
 
+use bonepd_ct::discretisation::lattice::sites::Sites;
 use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::operator::Operator;
 use bonepd_ct::physics::lattice::pieces::GradedLattice;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build, build_pieces};
-use bonepd_ct::topology::sites::Sites;
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build, build_pieces};
 use bonepd_ct::volume::{Specimen, Volume};
 
 const LP_MM: f64 = 0.1;

@@ -142,7 +142,8 @@ fn the_sample_scans_come_from_their_commands() {
         let mut words = words.clone();
         words[2] = made.to_str().unwrap();
         assert_eq!(run(&words).0, 0, "{command}");
-        let read = |path: &std::path::Path| bonepd_ct::io::scan::read(path, None).unwrap().volume;
+        let read =
+            |path: &std::path::Path| bonepd_ct::image::scan::read(path, None).unwrap().volume;
         let (made, kept) = (read(&made), read(&samples.join(name)));
         assert_eq!(made.grid, kept.grid, "{name}");
         assert!(

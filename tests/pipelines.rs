@@ -6,8 +6,8 @@
 
 use crate::cli::run;
 use bonepd_ct::io::table;
-use bonepd_ct::measure::row::Row;
 use bonepd_ct::recipe::Recipe;
+use bonepd_ct::result::row::Row;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -225,9 +225,9 @@ fn the_papers_recipe_names_every_key_with_its_default() {
 /// The same specimen as HU in NIfTI and as counts of a scanner: one mask.
 #[test]
 fn the_papers_window_is_of_hu_in_every_format() {
-    use bonepd_ct::io::scan;
-    use bonepd_ct::run::segment::in_memory;
-    use bonepd_ct::run::session::Session;
+    use bonepd_ct::command::segment::in_memory;
+    use bonepd_ct::command::session::Session;
+    use bonepd_ct::image::scan;
     let recipe = Recipe::read(&at_root("pipelines/paper.toml")).unwrap();
     let nifti = at_root("sample_data/trabecular.nii.gz");
     let volume = scan::read(&nifti, None).unwrap().volume;

@@ -2,11 +2,11 @@
 
 use crate::cli::run;
 use bonepd_ct::grid::{Axis, Grid};
-use bonepd_ct::io::nifti;
+use bonepd_ct::image::nifti;
 use bonepd_ct::measure::fabric::principal;
-use bonepd_ct::stage::segment::{Align, AlignBox, SegmentParams, SegmentSummary, Voi, segment};
-use bonepd_ct::stage::solve::SolveParams;
-use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::SolveParams;
+use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::segment::{Align, AlignBox, SegmentParams, SegmentSummary, Voi, segment};
 use bonepd_ct::volume::{Specimen, Volume};
 use std::f64::consts::PI;
 
@@ -274,7 +274,7 @@ fn a_recipe_turns_a_scan_and_keeps_its_place_in_the_world() {
         "{turned}"
     );
     assert_eq!(e_app(&["--turn", "z"], "straight"), 0.0);
-    let stored = bonepd_ct::io::scan::stored(dir.path().join("out/bar/mask.nii.gz").as_path());
+    let stored = bonepd_ct::image::scan::stored(dir.path().join("out/bar/mask.nii.gz").as_path());
     let stored = stored.unwrap();
     assert_eq!(stored.n, [10, 8, 14]);
     let rows = stored.affine.unwrap();

@@ -2,7 +2,7 @@
 
 use crate::cli::run;
 use crate::cohort::{cohort, rows, text};
-use bonepd_ct::measure::row::Row;
+use bonepd_ct::result::row::Row;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;

@@ -3,12 +3,13 @@
 mod outputs;
 
 use assert_cmd::Command;
+use bonepd_ct::discretisation::plane::Points;
 use bonepd_ct::error::Result;
 use bonepd_ct::grid::Grid;
-use bonepd_ct::io::nifti;
-use bonepd_ct::stage::scene::frame::{Frame, Observer};
-use bonepd_ct::stage::scene::{Inputs, Scene, check, run};
-use bonepd_ct::topology::plane::Points;
+use bonepd_ct::image::nifti;
+use bonepd_ct::scene::frame::{Frame, Observer};
+use bonepd_ct::scene::setting::Inputs;
+use bonepd_ct::scene::{Scene, check, run};
 use bonepd_ct::volume::Volume;
 use std::path::{Path, PathBuf};
 

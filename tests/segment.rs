@@ -2,7 +2,7 @@
 
 use crate::cli::run;
 use bonepd_ct::grid::Grid;
-use bonepd_ct::io::nifti;
+use bonepd_ct::image::nifti;
 use bonepd_ct::volume::Volume;
 use std::path::{Path, PathBuf};
 
@@ -54,7 +54,7 @@ fn the_real_stack_gives_the_published_count_of_bone_voxels() {
     // From an independent implementation with the same smoothing (σ 1, cut at 4 σ, mirrored edges).
     assert_eq!(results["bone_voxels"], 1_869_627);
     assert!((results["bv_tv"].as_f64().unwrap() - 0.2337).abs() < 5e-5);
-    let specimen = bonepd_ct::run::segment::load(&out).unwrap();
+    let specimen = bonepd_ct::command::segment::load(&out).unwrap();
     assert_eq!(specimen.bv_tv(), results["bv_tv"].as_f64().unwrap());
     assert_eq!(specimen.bone.grid, Grid::new([200; 3], [0.0195; 3]));
 }

@@ -3,11 +3,11 @@
 use crate::cli::run;
 use crate::made::specimen;
 use bonepd_ct::grid::Axis;
-use bonepd_ct::io::stiffness as file;
 use bonepd_ct::measure::stiffness::{Six, compliance, orthotropic, seen_from};
-use bonepd_ct::stage::solve::stiffness::{Stiffness, solve_stiffness};
-use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
-use bonepd_ct::stage::solve::{Conditions, Load, SolveParams};
+use bonepd_ct::pipeline::apparent::stiffness::{Stiffness, solve_stiffness};
+use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::{Conditions, Load, SolveParams};
+use bonepd_ct::record::stiffness as file;
 use bonepd_ct::volume::Specimen;
 
 const BOTH: [Conditions; 2] = [Conditions::Kinematic, Conditions::Mixed];
@@ -228,7 +228,7 @@ fn the_file_is_read_back_kept_and_made_again() {
     ];
     let (code, stdout, stderr) = run(&args);
     assert_eq!(code, 0, "{stderr}");
-    let rows: Vec<bonepd_ct::measure::row::Row> = serde_json::from_str(&stdout).unwrap();
+    let rows: Vec<bonepd_ct::result::row::Row> = serde_json::from_str(&stdout).unwrap();
     assert_eq!(
         (rows[0].load.as_str(), rows[0].ends.as_str()),
         ("stiffness", "kinematic")

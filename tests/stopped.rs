@@ -1,6 +1,7 @@
 //! The real stack's converged modulus by voxel elements, and a textbook solver to hold stops against.
 
 use crate::segment::shared_stack;
+use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::mask::resample;
 use bonepd_ct::operator::Operator;
@@ -9,10 +10,9 @@ use bonepd_ct::operator::held::{Constrained, Held};
 use bonepd_ct::par::dot;
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::Integration;
-use bonepd_ct::solve::jacobi::Jacobi;
-use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
-use bonepd_ct::stage::solve::{Ends, SolveParams};
-use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
+use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::{Ends, SolveParams};
+use bonepd_ct::solver::cg::jacobi::Jacobi;
 use bonepd_ct::volume::{Specimen, Volume};
 use rayon::prelude::*;
 
@@ -26,7 +26,7 @@ pub fn stack() -> Option<Specimen> {
     let flags = ["--spacing", "0.0195", "--gaussian", "1", "--lower", "63"];
     let args = [&["segment", path.to_str().unwrap(), "-o", out], &flags[..]].concat();
     assert_eq!(crate::cli::run(&args).0, 0);
-    Some(bonepd_ct::run::segment::load(dir.path()).unwrap())
+    Some(bonepd_ct::command::segment::load(dir.path()).unwrap())
 }
 
 /// Two voxels along every axis become one, bone where at least half of them are.

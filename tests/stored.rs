@@ -1,7 +1,7 @@
 //! Every way of storing a voxel that the README's table of formats names, value by value.
 
 use crate::formats::{bytes_of, volume};
-use bonepd_ct::io::scan;
+use bonepd_ct::image::scan;
 use std::io::Cursor;
 use std::path::Path;
 use tiff::encoder::colortype::{

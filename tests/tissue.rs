@@ -2,13 +2,14 @@
 
 use crate::cli::run;
 use bonepd_ct::grid::Grid;
-use bonepd_ct::io::{nifti, table};
-use bonepd_ct::measure::row::Row;
+use bonepd_ct::image::nifti;
+use bonepd_ct::io::table;
 use bonepd_ct::physics::material::{Label, Law, Material};
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure};
-use bonepd_ct::stage::solve::lattice::solve_lattice;
-use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
-use bonepd_ct::stage::solve::{Load, SolveParams};
+use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
+use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::{Load, SolveParams};
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure};
+use bonepd_ct::result::row::Row;
 use bonepd_ct::volume::{Specimen, Volume};
 
 /// A solid block, its voxels labelled 100 or 127.

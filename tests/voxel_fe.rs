@@ -1,10 +1,10 @@
 //! Voxel finite elements against closed forms, and the multigrid that solves them.
 
 use crate::made::specimen;
-use bonepd_ct::solve::cg::Ended;
-use bonepd_ct::stage::solve::solved::Solved;
-use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
-use bonepd_ct::stage::solve::{Ends, Load, SolveParams};
+use bonepd_ct::pipeline::apparent::solved::Solved;
+use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::{Ends, Load, SolveParams};
+use bonepd_ct::solver::cg::Ended;
 use bonepd_ct::volume::Specimen;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

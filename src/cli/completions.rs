@@ -1,8 +1,8 @@
 //! `completions`: words for the shell.
 
 use super::Cli;
+use bonepd_ct::command::Outcome;
 use bonepd_ct::error::Result;
-use bonepd_ct::run::Outcome;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 

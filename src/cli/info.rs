@@ -1,8 +1,8 @@
 //! `info`: what is known of a scan.
 
 use super::print_json;
+use bonepd_ct::command::Outcome;
 use bonepd_ct::error::Result;
-use bonepd_ct::run::Outcome;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ pub struct InfoArgs {
 }
 
 pub fn run(args: &InfoArgs, json: bool) -> Result<Outcome> {
-    let info = bonepd_ct::run::info::info(&args.file)?;
+    let info = bonepd_ct::command::info::info(&args.file)?;
     if json {
         print_json(&info);
     } else {

@@ -2,12 +2,12 @@
 
 use super::solve::TissueSettings;
 use super::{print_json, words};
+use bonepd_ct::command::Outcome;
+use bonepd_ct::command::lattice::{Export, Exports};
+use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
-use bonepd_ct::run::Outcome;
-use bonepd_ct::run::lattice::{Export, Exports};
-use bonepd_ct::run::session::Session;
-use bonepd_ct::stage::lattice::{Boundary, LatticeParams, Structure};
-use bonepd_ct::stage::solve::SolveParams;
+use bonepd_ct::pipeline::apparent::SolveParams;
+use bonepd_ct::pipeline::lattice::{Boundary, LatticeParams, Structure};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -75,7 +75,7 @@ pub fn run(args: &LatticeArgs, session: &Session, json: bool) -> Result<Outcome>
         bins: args.bins.into(),
     };
     args.tissue.apply(&mut exports.tissue)?;
-    let lattices = bonepd_ct::run::lattice::lattice(&args.dir, &params, &exports, session)?;
+    let lattices = bonepd_ct::command::lattice::lattice(&args.dir, &params, &exports, session)?;
     if json {
         print_json(&lattices);
     }

@@ -11,9 +11,9 @@ mod segment;
 mod solve;
 mod words;
 
+use bonepd_ct::command::Outcome;
+use bonepd_ct::command::session::Session;
 use bonepd_ct::error::{Error, Result};
-use bonepd_ct::run::Outcome;
-use bonepd_ct::run::session::Session;
 use clap::{Args, Parser, Subcommand};
 use serde::Serialize;
 

@@ -1,10 +1,10 @@
 //! `phantom`: a synthetic scan.
 
 use super::{print_json, words};
+use bonepd_ct::command::Outcome;
+use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
-use bonepd_ct::run::Outcome;
-use bonepd_ct::run::session::Session;
-use bonepd_ct::stage::phantom::PhantomParams;
+use bonepd_ct::pipeline::phantom::PhantomParams;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -108,7 +108,7 @@ impl PhantomArgs {
 pub fn run(args: &PhantomArgs, session: &Session, json: bool) -> Result<Outcome> {
     let params = args.params();
     let mask = args.mask.as_deref();
-    let summary = bonepd_ct::run::phantom::phantom(&args.out, mask, &params, session)?;
+    let summary = bonepd_ct::command::phantom::phantom(&args.out, mask, &params, session)?;
     if json {
         print_json(&summary);
     }

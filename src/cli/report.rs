@@ -1,9 +1,9 @@
 //! `report`: tables and figures from solved scans.
 
 use super::print_json;
+use bonepd_ct::command::Outcome;
+use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
-use bonepd_ct::run::Outcome;
-use bonepd_ct::run::session::Session;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ pub struct ReportArgs {
 }
 
 pub fn run(args: &ReportArgs, session: &Session, json: bool) -> Result<Outcome> {
-    let written = bonepd_ct::run::report::report(&args.dirs, &args.out, session)?;
+    let written = bonepd_ct::command::report::report(&args.dirs, &args.out, session)?;
     if json {
         print_json(&written);
     }

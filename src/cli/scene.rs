@@ -1,9 +1,9 @@
 //! `scene`: two-dimensional pair-potential scenes.
 
 use super::print_json;
+use bonepd_ct::command::Outcome;
+use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
-use bonepd_ct::run::Outcome;
-use bonepd_ct::run::session::Session;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub struct SceneArgs {
 }
 
 pub fn run(args: &SceneArgs, session: &Session, json: bool) -> Result<Outcome> {
-    let (outcome, record) = bonepd_ct::run::scene::scene(&args.scene, &args.out, session)?;
+    let (outcome, record) = bonepd_ct::command::scene::scene(&args.scene, &args.out, session)?;
     if let Some(record) = record.filter(|_| json) {
         print_json(&record);
     }

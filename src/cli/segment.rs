@@ -1,11 +1,11 @@
 //! `segment`: which voxels are bone.
 
 use super::{print_json, words};
+use bonepd_ct::command::Outcome;
+use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
 use bonepd_ct::grid::Axis;
-use bonepd_ct::run::Outcome;
-use bonepd_ct::run::session::Session;
-use bonepd_ct::stage::segment::{Align, AlignBox, GreyUnit, SegmentParams, Voi};
+use bonepd_ct::pipeline::segment::{Align, AlignBox, GreyUnit, SegmentParams, Voi};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -126,7 +126,8 @@ impl SegmentSettings {
 pub fn run(args: &SegmentArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut params = SegmentParams::default();
     args.settings.apply(&mut params)?;
-    let summary = bonepd_ct::run::segment::segment(&args.input, &args.out, None, &params, session)?;
+    let summary =
+        bonepd_ct::command::segment::segment(&args.input, &args.out, None, &params, session)?;
     if json {
         print_json(&summary);
     }

@@ -2,13 +2,13 @@
 
 use super::lattice::LatticeSettings;
 use super::{print_json, words};
+use bonepd_ct::command::Outcome;
+use bonepd_ct::command::session::Session;
 use bonepd_ct::error::{Error, Result};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::physics::material::{Law, Material};
-use bonepd_ct::run::Outcome;
-use bonepd_ct::run::session::Session;
-use bonepd_ct::stage::solve::fields::Field;
-use bonepd_ct::stage::solve::{Conditions, Ends, Load, Method, SolveParams};
+use bonepd_ct::pipeline::apparent::fields::Field;
+use bonepd_ct::pipeline::apparent::{Conditions, Ends, Load, Method, SolveParams};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -169,18 +169,19 @@ impl SolveSettings {
 pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut params = SolveParams::default();
     args.settings.apply(&mut params)?;
-    let mut lattice = bonepd_ct::run::lattice::settings(&args.dir)?;
+    let mut lattice = bonepd_ct::command::lattice::settings(&args.dir)?;
     args.lattice.apply(&mut lattice)?;
     if args.export.is_some() {
-        bonepd_ct::run::solve::export_inp(&args.dir, &params, args.bins.into(), session)?;
+        bonepd_ct::command::solve::export_inp(&args.dir, &params, args.bins.into(), session)?;
     }
     let (rows, met) = match args.error {
         Some(target) => {
-            let found = bonepd_ct::run::adaptive::solve_to(&args.dir, target, &params, session)?;
+            let found =
+                bonepd_ct::command::adaptive::solve_to(&args.dir, target, &params, session)?;
             (found.rows, found.met)
         }
         None => {
-            let rows = bonepd_ct::run::solve::solve(&args.dir, &lattice, &params, session)?;
+            let rows = bonepd_ct::command::solve::solve(&args.dir, &lattice, &params, session)?;
             (rows, true)
         }
     };

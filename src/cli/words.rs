@@ -1,7 +1,7 @@
 //! Owns the words of the command line: lists, percentages, crops, choices; from text to plain values.
 
 use bonepd_ct::physics::material::{Label, Law};
-use bonepd_ct::stage::segment::{Align, Voi};
+use bonepd_ct::pipeline::segment::{Align, Voi};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as WordError, StrDeserializer};
@@ -170,7 +170,7 @@ pub fn voi(word: &str) -> Result<Voi, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bonepd_ct::stage::lattice::Structure;
+    use bonepd_ct::pipeline::lattice::Structure;
 
     #[test]
     fn a_percentage_is_a_fraction() {

@@ -1,38 +1,4 @@
-//! Files: one format a file. [`scan`] is the way in, [`specimen`] the segmented scan on disk, [`atomic`] the way out.
+//! How files are written: whole or not at all ([`atomic`]), and tables of records ([`table`]).
 
-pub mod aim;
 pub mod atomic;
-pub mod bins;
-pub mod bitmap;
-pub mod dicom;
-mod dicom_lengths;
-pub mod extent;
-pub mod history;
-pub mod html;
-pub mod imagej;
-pub mod inp;
-pub mod isq;
-pub mod lammps;
-pub mod map;
-pub mod markdown;
-pub mod metaimage;
-pub mod nifti;
-pub mod npy;
-pub mod nrrd;
-pub mod orient;
-pub mod picture;
-pub mod plot;
-pub mod points;
-pub mod raw;
-pub mod scan;
-pub mod scanco;
-pub mod series;
-pub mod slices;
-pub mod specimen;
-pub mod state;
-pub mod stiffness;
 pub mod table;
-pub mod tiff;
-mod tiff_directories;
-pub mod vti;
-pub mod vtk;

@@ -89,7 +89,7 @@ fn unreadable(path: &Path, e: &csv::Error, header: Option<&csv::StringRecord>) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::row::Row;
+    use crate::result::row::Row;
 
     /// The contract's columns, in order; more may follow.
     const COLUMNS: &str = "scan,method,structure,boundary,lp_mm,registration,voxel_mm,young_mpa,poisson,load,ends,axis,\

@@ -8,11 +8,11 @@ mod step;
 
 pub use step::Step;
 
+use crate::discretisation::plane::Points;
 use crate::operator::reduction::Reduction;
 use crate::operator::sparse::Sparse;
 use crate::physics::growth::{Growth, Weight};
 use crate::physics::hyperelastic::{Energy, Plane};
-use crate::topology::plane::Points;
 use rayon::prelude::*;
 
 /// Relative densities below this are none at all.

@@ -2,17 +2,18 @@
 //! stops, and those of plain conjugate gradients. `cargo bench --bench iterations`, half an hour; words choose
 //! cases (`-- thin-3 stack`). Iterations do not depend on the machine.
 
+use bonepd_ct::command::segment::in_memory;
+use bonepd_ct::command::session::Session;
+use bonepd_ct::discretisation::voxels::Planes;
 use bonepd_ct::operator::held::Constrained;
-use bonepd_ct::run::segment::in_memory;
-use bonepd_ct::run::session::Session;
-use bonepd_ct::solve::cg::{self, CgParams, ENERGY_ALONE};
-use bonepd_ct::solve::jacobi::Jacobi;
-use bonepd_ct::stage::phantom::{PhantomParams, scan, structure};
-use bonepd_ct::stage::segment::{SegmentParams, segment};
-use bonepd_ct::stage::solve::bricks::{Bricks, Keep};
-use bonepd_ct::stage::solve::voxel_fe::{solve_voxels, supports};
-use bonepd_ct::stage::solve::{Ends, SolveParams};
-use bonepd_ct::topology::voxels::Planes;
+use bonepd_ct::pipeline::apparent::bricks::{Bricks, Keep};
+use bonepd_ct::pipeline::apparent::voxel_fe::{solve_voxels, supports};
+use bonepd_ct::pipeline::apparent::{Ends, SolveParams};
+use bonepd_ct::pipeline::phantom::{PhantomParams, scan, structure};
+use bonepd_ct::pipeline::segment::{SegmentParams, segment};
+use bonepd_ct::solver::cg;
+use bonepd_ct::solver::cg::jacobi::Jacobi;
+use bonepd_ct::solver::cg::{CgParams, ENERGY_ALONE};
 use bonepd_ct::volume::{Specimen, Volume};
 use std::path::Path;
 

@@ -5,20 +5,20 @@
 mod limits;
 mod specimen;
 
+use bonepd_ct::cohort::scans::Selection;
+use bonepd_ct::cohort::{Resources, cohort};
+use bonepd_ct::command::session::Session;
+use bonepd_ct::discretisation::lattice::sites::Sites;
 use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::held::Held;
 use bonepd_ct::operator::{MixedPrecision, Operator, SinglePreconditioner};
 use bonepd_ct::physics::lattice::multigrid::Springs;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
+use bonepd_ct::pipeline::apparent::SolveParams;
+use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build};
 use bonepd_ct::recipe::Recipe;
-use bonepd_ct::run::cohort::{Resources, cohort};
-use bonepd_ct::run::scans::Selection;
-use bonepd_ct::run::session::Session;
-use bonepd_ct::solve::amg::{Amg, AmgParams};
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure, build};
-use bonepd_ct::stage::solve::SolveParams;
-use bonepd_ct::stage::solve::lattice::solve_lattice;
-use bonepd_ct::topology::sites::Sites;
+use bonepd_ct::solver::amg::{Amg, AmgParams};
 use bonepd_ct::volume::Specimen;
 use criterion::{Criterion, Throughput};
 use limits::{Limits, median_s};

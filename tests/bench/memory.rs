@@ -4,12 +4,12 @@
 
 mod specimen;
 
-use bonepd_ct::stage::lattice::{Boundary, Case, Structure};
-use bonepd_ct::stage::solve::SolveParams;
-use bonepd_ct::stage::solve::lattice::solve_lattice;
-use bonepd_ct::stage::solve::need;
-use bonepd_ct::stage::solve::solved::Solved;
-use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::SolveParams;
+use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
+use bonepd_ct::pipeline::apparent::need;
+use bonepd_ct::pipeline::apparent::solved::Solved;
+use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 

@@ -5,6 +5,7 @@
 mod limits;
 mod specimen;
 
+use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::coarsen::Coarsen;
 use bonepd_ct::operator::held::Held;
@@ -12,10 +13,9 @@ use bonepd_ct::operator::{Operator, SinglePreconditioner};
 use bonepd_ct::par::CHUNK;
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::Integration;
-use bonepd_ct::solve::amg::{Amg, AmgParams};
-use bonepd_ct::stage::solve::SolveParams;
-use bonepd_ct::stage::solve::voxel_fe::solve_voxels;
-use bonepd_ct::topology::voxels::{Planes, VoxelMesh};
+use bonepd_ct::pipeline::apparent::SolveParams;
+use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::solver::amg::{Amg, AmgParams};
 use bonepd_ct::volume::Specimen;
 use criterion::{Criterion, Throughput};
 use limits::{Limits, median_s};

@@ -1,10 +1,11 @@
 //! Couple stresses (eqs. 177-181) against a closed form.
 
-use bonepd_ct::physics::anisotropic::tensor::{Plane, PlaneTensor};
-use bonepd_ct::stage::molecular::equilibrium::solve;
-use bonepd_ct::stage::molecular::setup::Setup;
-use bonepd_ct::stage::molecular::solid::Solid;
-use bonepd_ct::stage::scene::{Inputs, Physics, Scene};
+use bonepd_ct::physics::continuum_molecular::tensor::{Plane, PlaneTensor};
+use bonepd_ct::scene::continuum_molecular::equilibrium::solve;
+use bonepd_ct::scene::continuum_molecular::setup::Setup;
+use bonepd_ct::scene::continuum_molecular::solid::Solid;
+use bonepd_ct::scene::setting::Inputs;
+use bonepd_ct::scene::{Physics, Scene};
 use std::path::Path;
 
 /// Shear of an isotropic strip -H <= y <= H whose edges do not turn. With u along x and the rotation θ the local energy

@@ -1,8 +1,10 @@
 //! `history.csv` has a row for all that a scene reported.
 
 use super::{Kept, strip_text};
-use bonepd_ct::run::{scene::scene, session::Session};
-use bonepd_ct::stage::scene::{Inputs, Scene, run};
+use bonepd_ct::command::scene::scene;
+use bonepd_ct::command::session::Session;
+use bonepd_ct::scene::setting::Inputs;
+use bonepd_ct::scene::{Scene, run};
 
 /// What was reported, and the rows of the file.
 fn rows(text: &str) -> (Kept, Vec<Vec<f64>>) {

@@ -1,8 +1,9 @@
 //! What a continuum-molecular scene cannot be is refused in words, by a dry run and by a run alike.
 
 use super::{Kept, PLATE, refused, solved, strip_text, wired_strip};
-use bonepd_ct::stage::scene::frame::Values;
-use bonepd_ct::stage::scene::{Inputs, Scene, check};
+use bonepd_ct::scene::frame::Values;
+use bonepd_ct::scene::setting::Inputs;
+use bonepd_ct::scene::{Scene, check};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -125,8 +126,7 @@ fn negative_micromoduli_are_named() {
 fn maps_may_show_the_scalars_that_are_written() {
     let scalars = |kept: &Kept| -> BTreeSet<String> {
         let fields = kept.frames.iter().flat_map(|f| &f.fields);
-        let scalar =
-            |f: &&bonepd_ct::stage::scene::frame::Field| matches!(f.values, Values::Scalar(_));
+        let scalar = |f: &&bonepd_ct::scene::frame::Field| matches!(f.values, Values::Scalar(_));
         fields.filter(scalar).map(|f| f.name.to_owned()).collect()
     };
     for text in [

@@ -1,7 +1,7 @@
 //! Modes that share a frequency.
 
 use super::{Kept, number, solved};
-use bonepd_ct::stage::scene::frame::Summary;
+use bonepd_ct::scene::frame::Summary;
 
 fn square(size: usize, modes: usize) -> (Summary, Kept) {
     solved(&format!(

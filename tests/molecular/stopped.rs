@@ -1,11 +1,12 @@
 //! Continuum-molecular scenes that are stopped and go on.
 
 use super::strip_text;
+use bonepd_ct::discretisation::plane::Points;
 use bonepd_ct::error::{Error, Result};
-use bonepd_ct::stage::scene::frame::{Frame, Observer, Summary};
-use bonepd_ct::stage::scene::state::State;
-use bonepd_ct::stage::scene::{Inputs, Scene, run};
-use bonepd_ct::topology::plane::Points;
+use bonepd_ct::scene::frame::{Frame, Observer, Summary};
+use bonepd_ct::scene::setting::Inputs;
+use bonepd_ct::scene::state::State;
+use bonepd_ct::scene::{Scene, run};
 use std::path::Path;
 
 /// Stops after so many events, keeping the state of the last but one; what was reported since is lost with it.

@@ -6,7 +6,7 @@ const YOUNG: f64 = 1000.0;
 const EXPANSION: f64 = 1e-5;
 const RISE: f64 = 100.0;
 
-fn warm(hold: &str, poisson: f64) -> (bonepd_ct::stage::scene::frame::Summary, super::Kept) {
+fn warm(hold: &str, poisson: f64) -> (bonepd_ct::scene::frame::Summary, super::Kept) {
     solved(&format!(
         "hold = [{hold}]
         {PLATE}

@@ -1,8 +1,8 @@
 //! Crack, material and field turned together against the grid.
 
 use super::{Kept, solved};
-use bonepd_ct::physics::anisotropic::crack_tip::CrackTip;
-use bonepd_ct::physics::anisotropic::tensor::PlaneTensor;
+use bonepd_ct::physics::continuum_molecular::crack_tip::CrackTip;
+use bonepd_ct::physics::continuum_molecular::tensor::PlaneTensor;
 
 const MODULI: [f64; 6] = [1.0, 0.8, 0.2, 1.0 / 3.0, 0.1, 1.0 / 6.0];
 const K: [f64; 2] = [1.0, 0.4];

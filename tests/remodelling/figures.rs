@@ -1,11 +1,13 @@
 //! Figures and tables of `reports/remodelling.md`, from the scenes' results under `out/` (or `$BONEPD_OUT`):
 //! `cargo test --release --test all -- --ignored --nocapture remodelling_report`. Scenes that were not run are left out.
 
-use bonepd_ct::io::{map, plot, points};
-use bonepd_ct::stage::report::figure::{Axis, Content, Curve, Figure, Mark, Point};
-use bonepd_ct::stage::scene::Scene;
-use bonepd_ct::stage::scene::conditions::Region;
-use bonepd_ct::topology::plane::Points;
+use bonepd_ct::discretisation::plane::Points;
+use bonepd_ct::draw::map;
+use bonepd_ct::export::points;
+use bonepd_ct::report::figure::{Axis, Content, Curve, Figure, Mark, Point};
+use bonepd_ct::report::plot;
+use bonepd_ct::scene::Scene;
+use bonepd_ct::scene::conditions::Region;
 use image::{RgbImage, imageops};
 use std::path::{Path, PathBuf};
 

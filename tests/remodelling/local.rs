@@ -3,8 +3,8 @@
 use super::square::{
     FIVE_DIGITS, S2, SIX_DIGITS, assert_near, continuum_square, local_text, simulate,
 };
+use bonepd_ct::discretisation::plane::family::Stencil;
 use bonepd_ct::physics::bond_based::{micromodulus_continuous, micromodulus_discrete};
-use bonepd_ct::topology::family::Stencil;
 
 #[test]
 fn a2_lattice_constants_of_the_stencils() {

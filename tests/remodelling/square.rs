@@ -1,9 +1,10 @@
 //! The unit square of the paper's section 4.1: scenes and what they report.
 
+use bonepd_ct::discretisation::plane::Points;
 use bonepd_ct::error::Result;
-use bonepd_ct::stage::scene::frame::{Frame, Observer, Summary};
-use bonepd_ct::stage::scene::{Inputs, Scene, run};
-use bonepd_ct::topology::plane::Points;
+use bonepd_ct::scene::frame::{Frame, Observer, Summary};
+use bonepd_ct::scene::setting::Inputs;
+use bonepd_ct::scene::{Scene, run};
 use std::path::Path;
 
 /// Keeps what a scene reports.

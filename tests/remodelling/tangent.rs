@@ -1,16 +1,17 @@
 //! Exact tangents (spec A1), Newton's method, and the fast sum over bonds.
 
+use bonepd_ct::discretisation::plane::Points;
+use bonepd_ct::discretisation::plane::family::{Bond, Stencil};
+use bonepd_ct::discretisation::plane::layers::{Edge, add_layers};
 use bonepd_ct::operator::nonlinear::Staggered;
 use bonepd_ct::operator::reduction::{Reduction, Value};
 use bonepd_ct::operator::sparse::Sparse;
 use bonepd_ct::physics::bond_based::{BondBased, Material, Step, micromodulus_discrete};
-use bonepd_ct::physics::continuum::{self, Continuum, Old};
+use bonepd_ct::physics::continuum;
+use bonepd_ct::physics::continuum::{Continuum, Old};
 use bonepd_ct::physics::growth::{Growth, Weight};
 use bonepd_ct::physics::hyperelastic::Energy;
-use bonepd_ct::solve::newton::Newton;
-use bonepd_ct::topology::family::{Bond, Stencil};
-use bonepd_ct::topology::layers::{Edge, add_layers};
-use bonepd_ct::topology::plane::Points;
+use bonepd_ct::solver::newton::Newton;
 
 /// A small body by hand, away from symmetry: layers above and below, followers or held values beyond them.
 struct Toy {

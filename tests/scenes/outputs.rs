@@ -1,11 +1,14 @@
 //! What scenes read from and leave in folders: differences, folders used twice, dry runs, outlines, slices.
 
 use super::{BODY, pipelines, run_scene};
+use bonepd_ct::discretisation::plane::Points;
+use bonepd_ct::discretisation::plane::outline::Outline;
+use bonepd_ct::draw::map;
+use bonepd_ct::export::points;
 use bonepd_ct::grid::Grid;
-use bonepd_ct::io::{map, nifti, points};
-use bonepd_ct::stage::scene::{Inputs, Scene};
-use bonepd_ct::topology::outline::Outline;
-use bonepd_ct::topology::plane::Points;
+use bonepd_ct::image::nifti;
+use bonepd_ct::scene::Scene;
+use bonepd_ct::scene::setting::Inputs;
 use bonepd_ct::volume::Volume;
 
 /// Maps and numbers of the difference to another scene: what its fields say, with its sign; other points are refused.
@@ -144,7 +147,7 @@ fn the_femur_has_as_many_points_as_the_papers() {
         let path = pipelines().join(format!("{name}.toml"));
         let text = std::fs::read_to_string(&path).unwrap();
         let scene = Scene::parse(&text, &path).unwrap();
-        let Outline::Polygon(mut polygon) = scene.geometry.clone() else {
+        let Outline::Polygon(mut polygon) = scene.setting.geometry.clone() else {
             panic!("{name} has another outline");
         };
         polygon.corners =

@@ -2,10 +2,10 @@
 //! row of cells at a time. Points are spread over a grid padded by the horizon, so that a bond is a constant shift and
 //! its partners are read in one piece, without a list of neighbours.
 
+use crate::discretisation::plane::Points;
+use crate::discretisation::plane::family::Stencil;
 use crate::physics::growth::Weight;
 use crate::simd::{Isa, isa};
-use crate::topology::family::Stencil;
-use crate::topology::plane::Points;
 use rayon::prelude::*;
 
 const LANES: usize = 8;
@@ -102,7 +102,7 @@ impl Padded {
             at += LANES;
         }
         let area = stencil.spacing * stencil.spacing;
-        let shift = |b: &crate::topology::family::Bond| Shift {
+        let shift = |b: &crate::discretisation::plane::family::Bond| Shift {
             by: b.offset[1] as isize * stride as isize + b.offset[0] as isize,
             length: b.length,
             stiffness: micromodulus * b.share * area / b.length,

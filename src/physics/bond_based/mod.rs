@@ -7,12 +7,12 @@
 
 mod kernel;
 
+use crate::discretisation::plane::Points;
+use crate::discretisation::plane::family::{Bond, Family, Stencil};
 use crate::operator::nonlinear::{Nonlinear, Staggered};
 use crate::operator::reduction::Reduction;
 use crate::operator::sparse::Sparse;
 use crate::physics::growth::{Growth, Weight};
-use crate::topology::family::{Bond, Family, Stencil};
-use crate::topology::plane::Points;
 use kernel::Padded;
 pub use kernel::PointState;
 

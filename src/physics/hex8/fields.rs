@@ -1,7 +1,7 @@
 //! Owns what is read off solved bricks: each element's energy, stress, strain and displacement.
 
 use super::element::{self, ElementMatrix, Integration};
-use crate::topology::voxels::{Segment, VoxelMesh};
+use crate::discretisation::voxels::{Segment, VoxelMesh};
 use rayon::prelude::*;
 
 /// One kind of element: Young's modulus in MPa, Poisson's ratio, and how it is integrated.

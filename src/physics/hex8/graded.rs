@@ -4,10 +4,10 @@
 use super::element::{self, Integration};
 use super::kernel::{self, Elements};
 use super::stencils::{Couplings, Stencils};
+use crate::discretisation::voxels::VoxelMesh;
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::par;
-use crate::topology::voxels::VoxelMesh;
 use rayon::prelude::*;
 use std::ops::Range;
 

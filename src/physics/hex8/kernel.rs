@@ -13,8 +13,9 @@ mod graded;
 pub use graded::{Elements, graded_f32, graded_f64, low_corner};
 
 use super::stencils::{NINTH, STRIDE, Stencils};
-use crate::simd::{self, Isa, Lanes};
-use crate::topology::voxels::VoxelMesh;
+use crate::discretisation::voxels::VoxelMesh;
+use crate::simd;
+use crate::simd::{Isa, Lanes};
 use std::ops::Range;
 
 /// `y[i − nodes.start] = (A x)_i` for `i` in `nodes`, in double precision.

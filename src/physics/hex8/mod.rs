@@ -9,10 +9,10 @@ pub mod graded;
 mod kernel;
 mod stencils;
 
+use crate::discretisation::voxels::VoxelMesh;
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::par;
-use crate::topology::voxels::VoxelMesh;
 use element::Integration;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -116,8 +116,8 @@ fn positions(mesh: &VoxelMesh, sites: Range<usize>, x: &mut [[f64; 3]]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::discretisation::voxels::Planes;
     use crate::grid::{Axis, Grid};
-    use crate::topology::voxels::Planes;
 
     fn random(n: [usize; 3], percent: u64, seed: u64) -> Hex8 {
         let mut state = seed * 7919 + 1;

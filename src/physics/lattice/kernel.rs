@@ -1,7 +1,7 @@
 //! Owns the lattice's inner loops: what one site gathers from its neighbours.
 
-use super::quad::{Precision, Quad};
-use crate::topology::neighbours::{DECODED, EMPTY, LANES, Neighbours};
+use crate::discretisation::lattice::neighbours::{DECODED, EMPTY, LANES, Neighbours};
+use crate::simd::vec3::{Precision, Quad};
 use std::ops::Range;
 
 /// One opposite pair of bonds, scaled for the kernels.

@@ -12,12 +12,11 @@ pub mod moduli;
 mod kernel;
 pub mod multigrid;
 pub mod pieces;
-mod quad;
 mod scaled;
 
+use crate::discretisation::lattice::sites::Sites;
 use crate::operator::{MixedPrecision, Operator};
 use crate::par::{each_chunk, sum_chunks};
-use crate::topology::sites::Sites;
 pub use moduli::{Moduli, check_solid};
 use rayon::prelude::*;
 use scaled::Scaled;

@@ -1,7 +1,7 @@
 //! Owns the lattice's moduli: which springs make it the isotropic solid.
 
+use crate::discretisation::lattice::stencil::Structure;
 use crate::error::{Error, Result};
-use crate::topology::stencil::Structure;
 
 /// Moduli of a lattice: springs of both shells and the volumetric one, all in N/mm.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,10 +4,10 @@
 //! the preconditioner is built on the springs alone; conjugate gradients sees the whole lattice.
 
 use super::{Lattice, PORTION, range};
+use crate::discretisation::lattice::neighbours::MOST;
+use crate::discretisation::lattice::sites::Sites;
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
-use crate::topology::neighbours::MOST;
-use crate::topology::sites::Sites;
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -5,10 +5,10 @@
 //! negative where the uniform one is not (`k_s + N_s T >= 0`), whatever the shares.
 
 use super::{Moduli, Virial};
+use crate::discretisation::lattice::pieces::Pieces;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::operator::{MixedPrecision, Operator};
 use crate::par::each_chunk;
-use crate::topology::pieces::Pieces;
 use rayon::prelude::*;
 use std::ops::Range;
 

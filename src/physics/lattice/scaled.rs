@@ -1,12 +1,12 @@
 //! Owns the lattice's kernels in one precision: what they read, and which instruction set runs them.
 
 use super::kernel::{self, Bcc, Bonds, Fcc, Sc, Shape};
-use super::quad::{Precision, Quad};
 use super::{PORTION, range};
+use crate::discretisation::lattice::sites::Sites;
+use crate::discretisation::lattice::stencil::Structure;
 use crate::par::each_chunk;
+use crate::simd::vec3::{Precision, Quad};
 use crate::simd::{Isa, isa};
-use crate::topology::sites::Sites;
-use crate::topology::stencil::Structure;
 use rayon::prelude::*;
 use std::ops::Range;
 

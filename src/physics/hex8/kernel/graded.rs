@@ -2,8 +2,9 @@
 
 use super::super::stencils::{NINTH, Stencils};
 use super::{node, own};
-use crate::simd::{self, Isa, Lanes};
-use crate::topology::voxels::VoxelMesh;
+use crate::discretisation::voxels::VoxelMesh;
+use crate::simd;
+use crate::simd::{Isa, Lanes};
 use std::ops::{Mul, Range};
 
 /// The node that is the corner of smallest x, y, z of element `e` around node `i` of a segment.

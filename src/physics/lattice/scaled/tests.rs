@@ -1,10 +1,10 @@
 //! Owns the tests of the loops: against bonds one by one, on all registers.
 
 use super::*;
+use crate::discretisation::lattice::placement::{Boundary, Frame};
+use crate::discretisation::lattice::sites::Grips;
 use crate::grid::{Axis, Grid};
 use crate::physics::lattice::{Lattice, Moduli};
-use crate::topology::placement::{Boundary, Frame};
-use crate::topology::sites::Grips;
 
 /// A lattice on a random mask, dense or not, of random weights or of none.
 fn sites(structure: Structure, dense: u64, weighted: bool) -> Sites {

@@ -1,0 +1,273 @@
+//! Owns manifests: a CSV with one line per scan, its path and what is special about it. Cells are divided by commas, or, as
+//! spreadsheets and R's `write.csv2` have it where the comma is the decimal mark, by semicolons or tabs.
+
+use crate::cohort::scans::ScanJob;
+use crate::error::{Error, Result};
+use crate::image::scan;
+use crate::pipeline::segment::SegmentParams;
+use std::path::Path;
+
+/// The columns a manifest may have; `path` it must. Empty cells and `NA` leave the recipe's setting.
+const COLUMNS: [&str; 9] = [
+    "path",
+    "name",
+    "subject",
+    "group",
+    "spacing_mm",
+    "lower",
+    "upper",
+    "otsu",
+    "gaussian_voxels",
+];
+
+/// The scans of a manifest. Paths are relative to its folder.
+pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
+    let wrong = |found: String| {
+        Error::file(
+            path,
+            found,
+            format!(
+                "a manifest is a CSV with a header of these columns: {}",
+                COLUMNS.join(", ")
+            ),
+        )
+    };
+    let text = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    if let Err(e) = std::str::from_utf8(&text) {
+        let line = 1 + text[..e.valid_up_to()]
+            .iter()
+            .filter(|b| **b == b'\n')
+            .count();
+        return Err(Error::file(
+            path,
+            format!(
+                "line {line} is not UTF-8 text, as names with accents are where another encoding was chosen"
+            ),
+            "save it as UTF-8 (in Excel: Save as, CSV UTF-8; in R: fileEncoding = \"UTF-8\")",
+        ));
+    }
+    let delimiter = delimiter(&text);
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(delimiter)
+        .trim(csv::Trim::All)
+        .from_reader(&text[..]);
+    let header = reader
+        .headers()
+        .map_err(|e| wrong(format!("cannot be read: {e}")))?
+        .clone();
+    check_header(&header).map_err(wrong)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut jobs = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| wrong(format!("cannot be read: {e}")))?;
+        let cell = |column: &str| {
+            let at = header.iter().position(|name| name == column)?;
+            record
+                .get(at)
+                .filter(|cell| !cell.is_empty() && *cell != "NA")
+        };
+        let decimal_comma = delimiter != b',';
+        let line = record.position().map_or(0, csv::Position::line);
+        let job = job(cell, decimal_comma, folder, params)
+            .map_err(|found| wrong(format!("line {line}: {found}")))?;
+        job.segment.check().map_err(|e| of_line(path, line, e))?;
+        jobs.push(job);
+    }
+    if jobs.is_empty() {
+        return Err(wrong("lists no scans".to_owned()));
+    }
+    Ok(jobs)
+}
+
+/// A setting that cannot be used, told with the line of the manifest that gives it.
+fn of_line(path: &Path, line: u64, e: Error) -> Error {
+    match e {
+        Error::Setting { key, found, advice } => {
+            Error::file(path, format!("line {line}: {key}: {found}"), advice)
+        }
+        other => other,
+    }
+}
+
+/// What divides the cells of the header.
+fn delimiter(text: &[u8]) -> u8 {
+    let header = text.split(|b| *b == b'\n').next().unwrap_or_default();
+    let other = [b';', b'\t'].into_iter().find(|d| header.contains(d));
+    match other {
+        Some(other) if !header.contains(&b',') => other,
+        _ => b',',
+    }
+}
+
+fn check_header(header: &csv::StringRecord) -> std::result::Result<(), String> {
+    for name in header {
+        if !COLUMNS.contains(&name) {
+            let nearest = COLUMNS.iter().max_by(|a, b| {
+                strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b))
+            });
+            // Words that are not alike are no help.
+            let alike = nearest.filter(|best| strsim::jaro_winkler(name, best) > 0.75);
+            let advice = alike.map_or(String::new(), |best| format!("; did you mean `{best}`?"));
+            return Err(format!("unknown column `{name}`{advice}"));
+        }
+    }
+    match header.iter().any(|name| name == "path") {
+        true => Ok(()),
+        false => Err("has no column `path`".to_owned()),
+    }
+}
+
+fn job<'a>(
+    cell: impl Fn(&str) -> Option<&'a str>,
+    decimal_comma: bool,
+    folder: &Path,
+    params: &SegmentParams,
+) -> std::result::Result<ScanJob, String> {
+    let number = |column: &str| {
+        let Some(word) = cell(column) else {
+            return Ok(None);
+        };
+        let parsed = match decimal_comma {
+            true => word.replace(',', ".").parse::<f64>(),
+            false => word.parse(),
+        };
+        match parsed {
+            Ok(v) if v.is_finite() => Ok(Some(v)),
+            _ => Err(format!("expected a number in `{column}`, found `{word}`")),
+        }
+    };
+    let input = folder.join(cell("path").ok_or("no path")?);
+    let mut segment = params.clone();
+    let (lower, upper) = (number("lower")?, number("upper")?);
+    if lower.is_some() || upper.is_some() {
+        segment.lower = lower.or(segment.lower);
+        segment.upper = upper.or(segment.upper);
+        segment.otsu = false;
+    }
+    match cell("otsu") {
+        Some("true" | "TRUE" | "1" | "yes") => {
+            (segment.otsu, segment.lower, segment.upper) = (true, None, None);
+        }
+        None | Some("false" | "FALSE" | "0" | "no") => {}
+        Some(other) => return Err(format!("expected true or false in `otsu`, found `{other}`")),
+    }
+    segment.spacing_mm = number("spacing_mm")?.map(|h| [h; 3]).or(segment.spacing_mm);
+    segment.gaussian_voxels = number("gaussian_voxels")?.unwrap_or(segment.gaussian_voxels);
+    let text = |column| cell(column).map(str::to_owned);
+    Ok(ScanJob {
+        name: text("name").unwrap_or_else(|| scan::name(&input)),
+        input,
+        segment,
+        group: text("group"),
+        subject: text("subject"),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str) -> Result<Vec<ScanJob>> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cohort.csv");
+        std::fs::write(&path, text).unwrap();
+        let params = SegmentParams {
+            lower: Some(5.0),
+            upper: Some(2000.0),
+            ..SegmentParams::default()
+        };
+        let jobs = read(&path, &params)?;
+        assert!(jobs[0].input.starts_with(dir.path()));
+        Ok(jobs)
+    }
+
+    #[test]
+    fn each_line_is_a_scan_with_its_own_settings() {
+        let jobs = read_text(
+            "path, group, lower, spacing_mm, name\nscans/a.nii, OA, 200, 0.02, first\nscans/b.nii, NA, , , \n",
+        )
+        .unwrap();
+        assert_eq!(jobs.len(), 2);
+        assert_eq!(
+            (jobs[0].name.as_str(), jobs[1].name.as_str()),
+            ("first", "b")
+        );
+        assert_eq!(
+            (jobs[0].group.as_deref(), &jobs[1].group),
+            (Some("OA"), &None)
+        );
+        assert_eq!(
+            (jobs[0].segment.lower, jobs[1].segment.lower),
+            (Some(200.0), Some(5.0))
+        );
+        assert_eq!(
+            (jobs[0].segment.spacing_mm, jobs[1].segment.spacing_mm),
+            (Some([0.02; 3]), None)
+        );
+    }
+
+    #[test]
+    fn spreadsheets_of_other_countries_are_understood() {
+        let text = "path;spacing_mm;lower\r\na.nii;0,0195;200,5\r\nb.nii;0.02;\r\n";
+        // Some spreadsheets mark their files as UTF-8.
+        for text in [
+            text.to_owned(),
+            text.replace(';', "\t"),
+            format!("\u{feff}{text}"),
+        ] {
+            let jobs = read_text(&text).unwrap();
+            let spacings = jobs.iter().map(|job| job.segment.spacing_mm);
+            assert!(
+                spacings.eq([Some([0.0195; 3]), Some([0.02; 3])]),
+                "{jobs:?}"
+            );
+            assert_eq!(jobs[0].segment.lower, Some(200.5));
+        }
+        let words = read_text("path;lower\na.nii;1.200,5\n").unwrap_err();
+        assert!(words.to_string().contains("found `1.200,5`"), "{words}");
+    }
+
+    #[test]
+    fn an_empty_cell_leaves_the_recipes_window() {
+        let jobs = read_text("path,lower,upper\na.nii,,900\nb.nii,7,NA\n").unwrap();
+        let windows = jobs
+            .iter()
+            .map(|job| (job.segment.lower, job.segment.upper));
+        assert_eq!(
+            windows.collect::<Vec<_>>(),
+            [(Some(5.0), Some(900.0)), (Some(7.0), Some(2000.0))]
+        );
+    }
+
+    #[test]
+    fn another_encoding_is_told_with_its_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cohort.csv");
+        // As Excel saves `CSV` in western Europe.
+        std::fs::write(&path, b"path,group\na.nii,OA\nb.nii,gr\xfcn\n").unwrap();
+        let words = read(&path, &SegmentParams::default())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            words.contains("line 3") && words.contains("save it as UTF-8"),
+            "{words}"
+        );
+    }
+
+    #[test]
+    fn a_manifest_that_cannot_be_meant_is_said() {
+        for (text, said) in [
+            ("path,grup\na.nii,x\n", "did you mean `group`"),
+            ("name\na\n", "no column `path`"),
+            ("path,lower\na.nii,high\n", "line 2"),
+            ("path,lower\n", "lists no scans"),
+            (
+                "path,lower,upper\na.nii,1,3\nb.nii,9,3\n",
+                "cohort.csv: line 3: segment.lower: lower 9 lies above upper 3",
+            ),
+        ] {
+            let words = read_text(text).unwrap_err().to_string();
+            assert!(words.contains(said), "{text:?} said: {words}");
+        }
+    }
+}

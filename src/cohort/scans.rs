@@ -1,0 +1,294 @@
+//! Owns which scans a run is over: files, folders that are one scan, folders of scans, manifests.
+
+use crate::cohort::manifest;
+use crate::command::session::Session;
+use crate::error::{Error, Result};
+use crate::image::{extent, scan, slices};
+use crate::pipeline::segment::SegmentParams;
+use crate::record::specimen;
+use glob::Pattern;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// One scan of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanJob {
+    /// Unique in the run; names its folder and its rows.
+    pub name: String,
+    pub input: PathBuf,
+    pub segment: SegmentParams,
+    /// From a manifest, for statistics.
+    pub group: Option<String>,
+    pub subject: Option<String>,
+}
+
+/// Which scans of a folder.
+#[derive(Debug, Clone, Default)]
+pub struct Selection {
+    /// Into folders of folders.
+    pub recursive: bool,
+    /// Only scans whose file or folder name matches (`*` and `?`).
+    pub pattern: Option<Pattern>,
+}
+
+/// The scans under `inputs`, each with the recipe's settings or its manifest's.
+///
+/// # Errors
+/// An input that is not there, a folder without scans, two scans of one name.
+pub fn find(
+    inputs: &[PathBuf],
+    params: &SegmentParams,
+    selection: &Selection,
+    session: &Session,
+) -> Result<Vec<ScanJob>> {
+    let mut jobs = Vec::new();
+    for input in inputs {
+        if is_manifest(input) {
+            jobs.extend(manifest::read(input, params)?);
+            continue;
+        }
+        let found = scans_under(input, selection, session)?;
+        jobs.extend(found.into_iter().map(|(name, input)| ScanJob {
+            name,
+            input,
+            segment: params.clone(),
+            group: None,
+            subject: None,
+        }));
+    }
+    refuse_names(&jobs)?;
+    refuse_doubles(&jobs)?;
+    Ok(jobs)
+}
+
+/// The one scan of a name: one job of many on a cluster.
+///
+/// # Errors
+/// No scan of this name.
+pub fn only(jobs: &[ScanJob], name: &str) -> Result<Vec<ScanJob>> {
+    match jobs.iter().find(|job| job.name == name) {
+        Some(job) => Ok(vec![job.clone()]),
+        None => Err(Error::setting(
+            "--only",
+            format!("no scan is named {name}"),
+            "list the names with --dry-run",
+        )),
+    }
+}
+
+fn is_manifest(path: &Path) -> bool {
+    path.is_file()
+        && path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("csv"))
+}
+
+/// Names and paths of the scans that `input` is or holds.
+fn scans_under(
+    input: &Path,
+    selection: &Selection,
+    session: &Session,
+) -> Result<Vec<(String, PathBuf)>> {
+    if !input.is_dir() || is_one_scan(input) {
+        return Ok(vec![(scan::name(input), input.to_path_buf())]);
+    }
+    let mut found = Vec::new();
+    descend(input, selection, "", &mut found)?;
+    if let Some(pattern) = &selection.pattern {
+        found.retain(|(_, path)| {
+            path.file_name()
+                .is_some_and(|name| pattern.matches(&name.to_string_lossy()))
+        });
+    }
+    if found.is_empty() {
+        let wanted = selection
+            .pattern
+            .as_ref()
+            .map_or(String::new(), |p| format!(" that match {p}"));
+        return Err(Error::file(
+            input,
+            format!("holds no scans{wanted}"),
+            "give a scan, or a folder with scans; --recursive looks into folders of folders",
+        ));
+    }
+    session.detail(format!("{}: {} scans", input.display(), found.len()));
+    Ok(found)
+}
+
+/// A folder of single slices and no whole scans.
+fn is_one_scan(folder: &Path) -> bool {
+    let Ok(files) = listing(folder) else {
+        return false;
+    };
+    let slices: Vec<&PathBuf> = files.iter().filter(|f| slices::is_slice(f)).collect();
+    let whole = |f: &&PathBuf| scan::is_scan_file(f) && !slices::is_slice(f);
+    !slices.is_empty() && !files.iter().any(|f| whole(&f)) && !extent::is_stack(slices[0])
+}
+
+fn listing(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).and_then(|entries| {
+        let paths = entries.map(|entry| entry.map(|e| e.path()));
+        paths.collect::<std::io::Result<Vec<PathBuf>>>()
+    });
+    let mut paths = entries.map_err(|e| {
+        Error::file(
+            folder,
+            format!("cannot be listed: {e}"),
+            "check the folder and its permissions",
+        )
+    })?;
+    let hidden = |p: &Path| {
+        p.file_name()
+            .is_some_and(|n| n.to_string_lossy().starts_with('.'))
+    };
+    paths.retain(|p| !hidden(p));
+    let name = |p: &Path| p.to_string_lossy().into_owned();
+    paths.sort_by(|a, b| slices::natural(&name(a), &name(b)));
+    Ok(paths)
+}
+
+/// Scans in `folder`, results of earlier runs aside; names are prefixed with the folders on the way, so that they stay the same whatever else is there.
+fn descend(
+    folder: &Path,
+    selection: &Selection,
+    prefix: &str,
+    found: &mut Vec<(String, PathBuf)>,
+) -> Result<()> {
+    for path in listing(folder)? {
+        let name = format!("{prefix}{}", scan::name(&path));
+        let whole = path.is_file() && scan::is_scan_file(&path);
+        let single_page = slices::is_slice(&path) && !extent::is_stack(&path);
+        if whole && !single_page || path.is_dir() && is_one_scan(&path) {
+            found.push((name, path));
+        } else if path.is_dir() && selection.recursive && !path.join(specimen::RECORD).exists() {
+            descend(&path, selection, &format!("{name}_"), found)?;
+        }
+    }
+    Ok(())
+}
+
+/// Names become folders beside the run's own files.
+fn refuse_names(jobs: &[ScanJob]) -> Result<()> {
+    const OWN: [&str; 4] = ["report", "results.csv", "recipe.toml", "failed.csv"];
+    let path_like = |name: &str| name.contains(['/', '\\', '\0']) || [".", ".."].contains(&name);
+    for job in jobs {
+        let name = job.name.as_str();
+        if name.is_empty() || path_like(name) || OWN.contains(&name.to_lowercase().as_str()) {
+            return Err(Error::specimen(
+                format!("a scan cannot be named `{name}` ({})", job.input.display()),
+                "rename it, or list it in a manifest (CSV) with a column `name`: no slashes, and not the name of one of the run's own files",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn refuse_doubles(jobs: &[ScanJob]) -> Result<()> {
+    let mut seen: HashMap<String, &ScanJob> = HashMap::new();
+    for job in jobs {
+        // Folder names that differ in case only are one folder on some systems.
+        if let Some(other) = seen.insert(job.name.to_lowercase(), job) {
+            return Err(Error::specimen(
+                format!(
+                    "two scans are named {}: {} and {}",
+                    job.name,
+                    other.input.display(),
+                    job.input.display()
+                ),
+                "rename one, or list them in a manifest (CSV) with a column `name`",
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn find_names(inputs: &[PathBuf], selection: &Selection) -> Result<Vec<String>> {
+        let session = Session {
+            quiet: true,
+            ..Session::default()
+        };
+        let jobs = find(inputs, &SegmentParams::default(), selection, &session)?;
+        Ok(jobs.into_iter().map(|job| job.name).collect())
+    }
+
+    /// Empty files: names decide what is a scan, reading it comes later.
+    fn tree(files: &[&str]) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = dir.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        dir
+    }
+
+    #[test]
+    fn a_folder_of_slices_is_one_scan_a_folder_of_files_is_many() {
+        let dir = tree(&[
+            "s10/a1.tif",
+            "s10/a2.tif",
+            "s2.nii.gz",
+            "s1.nii",
+            "notes.txt",
+            "deep/s3.nii",
+        ]);
+        let root = dir.path().to_path_buf();
+        let plain = Selection::default();
+        assert_eq!(
+            find_names(std::slice::from_ref(&root), &plain).unwrap(),
+            ["s1", "s2", "s10"]
+        );
+        assert_eq!(find_names(&[root.join("s10")], &plain).unwrap(), ["s10"]);
+        let deep = Selection {
+            recursive: true,
+            ..Selection::default()
+        };
+        assert_eq!(
+            find_names(std::slice::from_ref(&root), &deep).unwrap(),
+            ["deep_s3", "s1", "s2", "s10"]
+        );
+        let gz = Selection {
+            recursive: true,
+            pattern: Some(Pattern::new("*.gz").unwrap()),
+        };
+        assert_eq!(find_names(&[root], &gz).unwrap(), ["s2"]);
+    }
+
+    #[test]
+    fn two_scans_of_one_name_are_refused() {
+        let dir = tree(&["a/s.nii", "b/S.nii.gz"]);
+        let words = find_names(
+            &[dir.path().join("a"), dir.path().join("b")],
+            &Selection::default(),
+        );
+        assert!(
+            words
+                .unwrap_err()
+                .to_string()
+                .contains("two scans are named")
+        );
+    }
+
+    #[test]
+    fn a_scan_cannot_take_the_place_of_the_runs_own_files() {
+        let dir = tree(&["report.nii", "a.nii"]);
+        let root = dir.path().to_path_buf();
+        let words = find_names(&[root], &Selection::default()).unwrap_err();
+        assert!(words.to_string().contains("cannot be named `report`"));
+        let manifest = dir.path().join("cohort.csv");
+        std::fs::write(&manifest, "path,name\na.nii,../../home\n").unwrap();
+        let words = find_names(&[manifest], &Selection::default()).unwrap_err();
+        assert!(words.to_string().contains("no slashes"), "{words}");
+    }
+
+    #[test]
+    fn a_folder_without_scans_is_said() {
+        let dir = tree(&["notes.txt"]);
+        let words = find_names(&[dir.path().to_path_buf()], &Selection::default());
+        assert!(words.unwrap_err().to_string().contains("holds no scans"));
+    }
+}

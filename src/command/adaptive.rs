@@ -1,0 +1,238 @@
+//! Owns `solve --error`: resolutions tried from cheap to dear until the stated error meets its target.
+//!
+//! First three graded lattices (LP from the strut thickness to half of it), then pairs of voxel-FE solves whose elements
+//! differ by a factor of two, beginning at the coarsest pair that can be expected to suffice.
+
+use crate::command::segment::load;
+use crate::command::session::Session;
+use crate::command::solve::{in_words, solve};
+use crate::error::Result;
+use crate::measure::thickness::plate_thickness_mm;
+use crate::pipeline::apparent::{Method, SolveParams};
+use crate::pipeline::lattice::{Boundary, LatticeParams, Structure};
+use crate::record::missed::Missed;
+use crate::record::results::Results;
+use crate::result::extrapolate::{EXTRAPOLATED, expected_of_pair, with_extrapolated};
+use crate::result::row::Row;
+use crate::volume::Volume;
+use std::path::Path;
+
+/// Lattice parameters tried, in strut thicknesses.
+const LP_OVER_THICKNESS: [f64; 3] = [1.0, 0.75, 0.5];
+
+/// The finer of each pair of voxel-FE solves: voxels per element, elements per voxel.
+const PAIRS: [(usize, usize); 4] = [(2, 1), (1, 1), (1, 2), (1, 4)];
+
+/// A pair is worth a try where its expected error is at most this many targets.
+const MARGIN: f64 = 1.2;
+
+/// Elements that a voxel-FE solve may have at most: some 8 GiB.
+const MOST_ELEMENTS: f64 = 2.5e7;
+
+/// What came of it.
+pub struct Found {
+    /// The rows of all that was tried.
+    pub rows: Vec<Row>,
+    /// Whether one of them met the target.
+    pub met: bool,
+}
+
+/// Solves the specimen in `dir` until the algebraic and the discretisation error together are below `target` (0.03 is
+/// 3 %), and says which row it is. What was tried stands in the results.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session) -> Result<Found> {
+    let specimen = load(dir)?;
+    if !session.dry_run {
+        // Of an earlier error asked for.
+        Results::open(dir, false)?.renote(Missed::take_back)?;
+    }
+    if session.force && !session.dry_run {
+        Results::begin_anew(dir)?;
+    }
+    // Dropped once: redone at every step, each would drop what the one before it solved.
+    let session = &Session {
+        force: false,
+        ..session.clone()
+    };
+    let mut rows = Vec::new();
+    let params = SolveParams {
+        // A tenth of the whole error is left to the solver.
+        tolerance: params.tolerance.min(0.1 * target),
+        ..params.clone()
+    };
+    let bone = &specimen.bone;
+    let Some(thickness) = plate_thickness_mm(bone) else {
+        // A block of bone without a surface: one element a voxel is exact.
+        rows = solve(
+            dir,
+            &LatticeParams::default(),
+            &voxel_fe(&params, 1, 1),
+            session,
+        )?;
+        return Ok(Found { rows, met: true });
+    };
+    let shortest = bone
+        .grid
+        .size_mm()
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    let lattices = LatticeParams {
+        structure: vec![Structure::Sc],
+        lp_mm: LP_OVER_THICKNESS
+            .map(|f| (1e4 * f * thickness.min(0.1 * shortest)).round() / 1e4)
+            .to_vec(),
+        boundary: vec![Boundary::Graded],
+        ..LatticeParams::default()
+    };
+    if lattices.lp_mm.iter().all(|lp| *lp > 0.0) {
+        let lattice = SolveParams {
+            method: Method::Lattice,
+            ..params.clone()
+        };
+        rows.extend(solve(dir, &lattices, &lattice, session)?);
+        let broken = |r: &Row| r.e_app_mpa == Some(0.0);
+        if !session.dry_run && (meets(&rows, target) || rows.iter().all(broken)) {
+            return finish(dir, rows, target, session);
+        }
+    }
+    let elements = bone.as_slice().iter().filter(|b| **b != 0).count() as f64;
+    let suffices = |pair| suffices(bone, pair, thickness, target);
+    let any = PAIRS.into_iter().any(suffices);
+    for (coarsen, refine) in PAIRS {
+        let element = element_mm(bone, (coarsen, refine));
+        // Where none can be expected to suffice, one element a voxel says how far one gets.
+        if !suffices((coarsen, refine)) && (any || (coarsen, refine) != (1, 1)) {
+            continue;
+        }
+        if elements * (refine as f64).powi(3) > MOST_ELEMENTS {
+            session.warn(format!(
+                "elements of {element:.4} mm would be {:.0} million, too many: the specimen must be cropped for a smaller error",
+                elements * (refine as f64).powi(3) / 1e6
+            ));
+            break;
+        }
+        let twice = if refine > 1 {
+            (1, refine / 2)
+        } else {
+            (2 * coarsen, 1)
+        };
+        let none = LatticeParams::default();
+        let pair = [twice, (coarsen, refine)];
+        let mut own = Vec::new();
+        for (coarsen, refine) in pair {
+            own.extend(solve(
+                dir,
+                &none,
+                &voxel_fe(&params, coarsen, refine),
+                session,
+            )?);
+        }
+        // Neighbouring pairs share a size.
+        let new = with_extrapolated(&own);
+        rows.extend(
+            new.into_iter()
+                .filter(|row| !rows.contains(row))
+                .collect::<Vec<_>>(),
+        );
+        if meets(&rows, target) {
+            break;
+        }
+    }
+    finish(dir, rows, target, session)
+}
+
+/// Edge of the finer elements of a pair.
+fn element_mm(bone: &Volume<u8>, (coarsen, refine): (usize, usize)) -> f64 {
+    bone.grid.voxel_mm3().cbrt() * coarsen as f64 / refine as f64
+}
+
+/// Whether a pair is worth a try.
+fn suffices(bone: &Volume<u8>, pair: (usize, usize), thickness: f64, target: f64) -> bool {
+    expected_of_pair(element_mm(bone, pair), thickness) <= MARGIN * target
+}
+
+/// What [`solve_to`] can be expected to come to for a specimen, if lattices do not suffice: the finer voxel-FE solve of the
+/// first pair that should.
+pub fn expected(bone: &Volume<u8>, target: f64, params: &SolveParams) -> SolveParams {
+    let first = |thickness| {
+        PAIRS
+            .into_iter()
+            .find(|pair| suffices(bone, *pair, thickness, target))
+    };
+    let (coarsen, refine) = plate_thickness_mm(bone).and_then(first).unwrap_or((1, 1));
+    voxel_fe(params, coarsen, refine)
+}
+
+fn voxel_fe(params: &SolveParams, coarsen: usize, refine: usize) -> SolveParams {
+    SolveParams {
+        method: Method::VoxelFe,
+        coarsen,
+        refine,
+        ..params.clone()
+    }
+}
+
+/// Algebraic and discretisation error of a row together, relative; None where either is not stated.
+fn stated(row: &Row) -> Option<f64> {
+    let error = row.algebraic_error_mpa? + row.discretization_error_mpa?;
+    let limit = row.boundary.as_deref() == Some(EXTRAPOLATED) || row.boundary.is_none();
+    row.e_app_mpa
+        .filter(|e| *e > 0.0 && limit)
+        .map(|e| error / e)
+}
+
+fn best(rows: &[Row]) -> Option<(&Row, f64)> {
+    let stated = rows.iter().filter_map(|row| Some((row, stated(row)?)));
+    stated.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Whether the stated error of one of the rows is at most `target`.
+pub fn meets(rows: &[Row], target: f64) -> bool {
+    best(rows).is_some_and(|(_, error)| error <= target)
+}
+
+fn said(target: f64, best: Option<(&Row, f64)>) -> String {
+    let least = best.map_or("no error could be stated".to_owned(), |(_, error)| {
+        format!("the least stated is {}", percent(error))
+    });
+    format!("{}, is not met: {least}", percent(target))
+}
+
+fn percent(x: f64) -> String {
+    format!("{:.2} %", 100.0 * x)
+}
+
+/// Says what came of it; where the target is missed, so do the rows, here and in the results.
+fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Result<Found> {
+    if session.dry_run || rows.iter().all(|r| r.e_app_mpa == Some(0.0)) {
+        return Ok(Found { rows, met: true });
+    }
+    let met = meets(&rows, target);
+    match best(&rows) {
+        Some((row, error)) if met => session.say(format!(
+            "error {} of {} asked for: {}",
+            percent(error),
+            percent(target),
+            in_words(row)
+        )),
+        Some((row, error)) => session.warn(format!(
+            "the error asked for, {}, could not be met: the least that can be stated is {} ({})",
+            percent(target),
+            percent(error),
+            in_words(row)
+        )),
+        None => session.warn("no error could be stated: no solve converged"),
+    }
+    if !met {
+        let nearest = best(&rows);
+        let missed = Missed::of(
+            nearest.map(|(row, _)| row).or(rows.last()),
+            said(target, nearest),
+        );
+        rows.iter_mut().for_each(|row| missed.note(row));
+        Results::open(dir, false)?.renote(|row| missed.note(row))?;
+    }
+    Ok(Found { rows, met })
+}

@@ -1,0 +1,244 @@
+//! Owns `info`: what is known of a scan, without segmenting it.
+
+use crate::error::Result;
+use crate::image::orient::Turn;
+use crate::image::scan;
+use crate::image::scanco::Calibration;
+use crate::mask::threshold;
+use crate::pipeline::segment::GreyUnit;
+use serde::Serialize;
+use std::path::Path;
+
+/// What a scan's file says, and what its grey values are.
+#[derive(Debug, Clone, Serialize)]
+pub struct ScanInfo {
+    pub scan: String,
+    pub format: String,
+    /// Along x, y, z of the axes turned to the file's orientation, as all commands use them.
+    pub voxels: [usize; 3],
+    /// None where the file does not say. Along the same axes.
+    pub spacing_mm: Option<[f64; 3]>,
+    pub size_mm: Option<[f64; 3]>,
+    /// Unit of the grey values where known.
+    pub unit: Option<String>,
+    pub grey_min: Option<f32>,
+    pub grey_max: Option<f32>,
+    pub grey_mean: Option<f64>,
+    /// Grey values below which 1, 25, 50, 75 and 99 % of the voxels lie.
+    pub grey_percentiles: Vec<f32>,
+    /// Otsu's threshold of the values as they are, unsmoothed: a first guess, not a calibration.
+    pub otsu: Option<f64>,
+    /// Share of the voxels at or above it.
+    pub otsu_share: Option<f64>,
+    /// Values and their voxels where they are few: a labelled scan or a mask.
+    pub labels: Vec<(f32, u64)>,
+    pub calibration: Option<Calibration>,
+    pub non_finite_voxels: u64,
+    pub blake3: String,
+    /// Further facts of the format. Names of persons are left out.
+    pub details: Vec<(String, String)>,
+    pub notes: Vec<String>,
+    /// One line per fact, for people.
+    #[serde(skip)]
+    pub lines: Vec<String>,
+}
+
+pub fn info(file: &Path) -> Result<ScanInfo> {
+    let stored = scan::stored(file)?;
+    let mut sorted: Vec<f32> = stored
+        .values
+        .iter()
+        .copied()
+        .filter(|v| v.is_finite())
+        .collect();
+    let non_finite = (stored.values.len() - sorted.len()) as u64;
+    let mean = sorted.iter().map(|&v| f64::from(v)).sum::<f64>() / sorted.len().max(1) as f64;
+    sorted.sort_unstable_by(f32::total_cmp);
+    let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
+    let some = !sorted.is_empty();
+    let otsu = otsu(&sorted);
+    let above = |t: f64| sorted.len() - sorted.partition_point(|&v| f64::from(v) < t);
+    let otsu_share = otsu.map(|t| above(t) as f64 / sorted.len() as f64);
+    let turn = stored.affine.as_ref().and_then(Turn::of);
+    let from = turn.map_or([0, 1, 2], |turn| turn.from);
+    let voxels = from.map(|a| stored.n[a]);
+    let spacing = stored.spacing_mm.map(|s| from.map(|a| s[a]));
+    let size = spacing.map(|s| std::array::from_fn(|a| s[a] * voxels[a] as f64));
+    let mut info = ScanInfo {
+        scan: scan::name(file),
+        format: stored.format,
+        voxels,
+        spacing_mm: spacing,
+        size_mm: size,
+        unit: stored.unit,
+        grey_min: some.then(|| at(0.0)),
+        grey_max: some.then(|| at(1.0)),
+        grey_mean: some.then_some(mean),
+        grey_percentiles: if some {
+            [0.01, 0.25, 0.5, 0.75, 0.99].map(at).to_vec()
+        } else {
+            Vec::new()
+        },
+        otsu,
+        otsu_share,
+        labels: labels(&sorted),
+        calibration: stored.calibration,
+        non_finite_voxels: non_finite,
+        blake3: scan::hash(file)?,
+        details: stored.details,
+        notes: stored.notes,
+        lines: Vec::new(),
+    };
+    if let Some(turn) = turn {
+        let words = if turn.is_identity() {
+            "canonical (x right, y front, z up)".into()
+        } else {
+            format!("axes are turned: {}", turn.words())
+        };
+        info.details.push(("orientation".into(), words));
+    }
+    if from != [0, 1, 2] {
+        let [i, j, k] = stored.n;
+        let size = stored.spacing_mm.map(triple);
+        let size = size.map_or(String::new(), |size| format!(", {size} mm each"));
+        let words = format!("{i} × {j} × {k} voxels along i, j, k{size}");
+        info.details.push(("as stored".into(), words));
+    }
+    info.lines = lines(&info);
+    Ok(info)
+}
+
+/// None where there is one value only.
+fn otsu(sorted: &[f32]) -> Option<f64> {
+    let (min, max) = (*sorted.first()?, *sorted.last()?);
+    if min == max {
+        return None;
+    }
+    let counts = threshold::histogram(sorted, min, max);
+    threshold::otsu(&counts, f64::from(min), f64::from(max))
+}
+
+/// More different values than this are grey values.
+const MOST_LABELS: usize = 12;
+
+/// Whole numbers and how often they occur; empty where values are many or broken.
+fn labels(sorted: &[f32]) -> Vec<(f32, u64)> {
+    let mut found = Vec::new();
+    let mut rest = sorted;
+    while let Some(&value) = rest.first() {
+        if found.len() == MOST_LABELS || value.fract() != 0.0 {
+            return Vec::new();
+        }
+        let count = rest.partition_point(|&v| v <= value);
+        found.push((value, count as u64));
+        rest = &rest[count..];
+    }
+    found
+}
+
+fn triple(v: [f64; 3]) -> String {
+    format!("{} × {} × {}", short(v[0]), short(v[1]), short(v[2]))
+}
+
+fn lines(info: &ScanInfo) -> Vec<String> {
+    let [nx, ny, nz] = info.voxels;
+    let mut lines = vec![
+        format!("scan         {}", info.scan),
+        format!("format       {}", info.format),
+        format!("voxels       {nx} × {ny} × {nz}"),
+        match info.spacing_mm {
+            Some(s) => format!("voxel size   {} mm", triple(s)),
+            None => "voxel size   not in the file: give --spacing".into(),
+        },
+    ];
+    lines.extend(
+        info.size_mm
+            .map(|s| format!("size         {} mm", triple(s))),
+    );
+    let unit = info.unit.as_deref().unwrap_or("unit not in the file");
+    if let (Some(min), Some(max), Some(mean)) = (info.grey_min, info.grey_max, info.grey_mean) {
+        lines.push(format!(
+            "grey values  {min} to {max}, mean {} ({unit})",
+            short(mean)
+        ));
+        let p = &info.grey_percentiles;
+        lines.push(format!(
+            "percentiles  1 %: {}, 25 %: {}, 50 %: {}, 75 %: {}, 99 %: {}",
+            p[0], p[1], p[2], p[3], p[4]
+        ));
+    }
+    lines.extend(suggestion(info));
+    if info.non_finite_voxels > 0 {
+        lines.push(format!(
+            "not finite   {} voxels (taken as pore)",
+            info.non_finite_voxels
+        ));
+    }
+    lines.push(format!("blake3       {}", info.blake3));
+    lines.extend(
+        info.details
+            .iter()
+            .map(|(key, value)| format!("{key:<12} {value}")),
+    );
+    lines.extend(info.notes.iter().map(|note| format!("note         {note}")));
+    lines
+}
+
+/// What to segment by: the labels of a labelled scan, or Otsu's threshold.
+fn suggestion(info: &ScanInfo) -> Vec<String> {
+    let voxels: usize = info.voxels.iter().product();
+    let percent = |count: f64| 100.0 * count / voxels.max(1) as f64;
+    let mut lines = Vec::new();
+    if !info.labels.is_empty() {
+        let words: Vec<String> = info
+            .labels
+            .iter()
+            .map(|&(value, count)| format!("{value}: {:.2} %", percent(count as f64)))
+            .collect();
+        lines.push(format!("labels       {}", words.join(", ")));
+        let bone: Vec<String> = info
+            .labels
+            .iter()
+            .filter(|l| l.0 > 0.0)
+            .map(|l| l.0.to_string())
+            .collect();
+        if !bone.is_empty() && info.labels.len() > 1 {
+            lines.push(format!("suggestion   segment --labels {}", bone.join(",")));
+        }
+        return lines;
+    }
+    let (Some(t), Some(share)) = (info.otsu, info.otsu_share) else {
+        return lines;
+    };
+    let mut line = format!(
+        "Otsu         {}, {:.1} % of the voxels lie above",
+        short(t),
+        100.0 * share
+    );
+    let mut lower = "--lower";
+    if let Some(calibration) = info.calibration {
+        if calibration.line(GreyUnit::Hu, Path::new("")).is_ok() {
+            lower = "--units hu --lower";
+        }
+        for unit in [GreyUnit::Hu, GreyUnit::Mgha] {
+            if let Ok(([slope, intercept], name)) = calibration.line(unit, Path::new("")) {
+                line += &format!("; {} {name}", short(slope * t + intercept));
+            }
+        }
+    }
+    lines.push(line);
+    lines.push(format!(
+        "suggestion   segment --otsu, or {lower} with the threshold of your protocol; look at segment.png"
+    ));
+    lines
+}
+
+/// Six significant digits, none in vain.
+fn short(v: f64) -> f64 {
+    if v == 0.0 || !v.is_finite() {
+        return v;
+    }
+    let digits = 5 - v.abs().log10().floor() as i32;
+    let scale = 10f64.powi(digits);
+    (v * scale).round() / scale
+}

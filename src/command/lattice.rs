@@ -1,0 +1,204 @@
+//! Owns `lattice` on disk: builds the lattices of a segmented scan, reports their counts, exports them.
+
+use crate::command::estimate::refuse_lattice_that_does_not_fit;
+use crate::command::segment::load;
+use crate::command::session::Session;
+use crate::discretisation::lattice::pieces::Pieces;
+use crate::discretisation::lattice::sites::Sites;
+use crate::error::{Error, Result};
+use crate::export::{lammps, vtk};
+use crate::grid::Axis;
+use crate::io::atomic;
+use crate::pipeline::apparent::SolveParams;
+use crate::pipeline::apparent::tissue::Tissue;
+use crate::pipeline::lattice::{
+    Case, LatticeParams, LatticeSummary, build, build_of, build_pieces, summarise, summarise_pieces,
+};
+use crate::record::specimen;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A format for other programs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Export {
+    Lammps,
+    Vtk,
+}
+
+/// What is written for other programs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exports {
+    pub formats: Vec<Export>,
+    /// Young's modulus and, for LAMMPS, the law of moduli that differ.
+    pub tissue: SolveParams,
+    /// Different stiffnesses in one file at most.
+    pub bins: usize,
+}
+
+/// `lattice.json`: the settings `solve` finds there, and what they came to (nothing where `run` went straight on to the
+/// solves).
+#[derive(Debug, Serialize, Deserialize)]
+struct Record {
+    version: String,
+    settings: LatticeParams,
+    lattices: Vec<LatticeSummary>,
+}
+
+const RECORD: &str = "lattice.json";
+
+/// Builds every lattice asked for from the mask in `dir`, with the end planes along z gripped, writes `dir/lattice.json`
+/// (settings and counts) and one file per lattice and export format.
+pub fn lattice(
+    dir: &Path,
+    params: &LatticeParams,
+    exports: &Exports,
+    session: &Session,
+) -> Result<Vec<LatticeSummary>> {
+    params.check()?;
+    exports.tissue.check()?;
+    let mut specimen = load(dir)?;
+    let factors = match exports.tissue.material {
+        None => None,
+        Some(_) => {
+            specimen.grey = specimen::load_grey(dir, &specimen.bone)?;
+            match Tissue::of(&specimen, &exports.tissue)? {
+                Tissue::Uniform(solid) => Some((solid.young_mpa, None)),
+                Tissue::Mixed(mixed) => Some((mixed.mean_mpa, Some(mixed.factor))),
+            }
+        }
+    };
+    let (young_mpa, factors) = factors.unwrap_or((exports.tissue.young_mpa, None));
+    let written = Written {
+        dir,
+        formats: if session.dry_run {
+            &[]
+        } else {
+            &exports.formats
+        },
+        tissue: lammps::Tissue {
+            young_mpa,
+            bins: exports.bins,
+        },
+        session,
+    };
+    if factors.is_none() && dir.join(specimen::GREY).exists() && !exports.formats.is_empty() {
+        session.warn(
+            "the folder keeps grey values, but the exported lattices are of one tissue: give --material for moduli that follow them",
+        );
+    }
+    if exports.formats.contains(&Export::Lammps) {
+        session.warn(
+            "LAMMPS data hold bonds alone, and a lattice of bonds alone has a Poisson's ratio of 0.25, whatever the tissue's (0.3 unless told otherwise): hold their results against `solve --poisson 0.25`",
+        );
+    }
+    let mut lattices = Vec::new();
+    for case in params.cases() {
+        refuse_lattice_that_does_not_fit(&specimen, &case)?;
+        let summary = if case.in_pieces() {
+            let pieces = build_pieces(&specimen, &case, Axis::Z, 0.0)?;
+            written.pieces(&case, &pieces)?;
+            summarise_pieces(&specimen, &case, &pieces)
+        } else {
+            let sites = build(&specimen, &case, Axis::Z, 0.0)?;
+            match &factors {
+                None => written.sites(&case, &sites)?,
+                Some(factors) => {
+                    let mixed = build_of(&specimen, Some(factors), &case, Axis::Z, 0.0)?;
+                    written.sites(&case, &mixed)?;
+                }
+            }
+            summarise(&specimen, &case, &sites)
+        };
+        session.say(summary.in_words());
+        lattices.push(summary);
+    }
+    if !session.dry_run {
+        write(dir, params, lattices.clone())?;
+    }
+    Ok(lattices)
+}
+
+/// Writes `dir/lattice.json` for `solve` to find the settings there, without building a lattice: `solve` builds each
+/// once, and its rows tell what it came to.
+pub fn remember(dir: &Path, params: &LatticeParams) -> Result<()> {
+    params.check()?;
+    write(dir, params, Vec::new())
+}
+
+fn write(dir: &Path, params: &LatticeParams, lattices: Vec<LatticeSummary>) -> Result<()> {
+    let record = Record {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        settings: params.clone(),
+        lattices,
+    };
+    let text = serde_json::to_string_pretty(&record).expect("plain data");
+    atomic::write(&dir.join(RECORD), text)
+}
+
+/// Where exported lattices go.
+struct Written<'a> {
+    dir: &'a Path,
+    formats: &'a [Export],
+    tissue: lammps::Tissue,
+    session: &'a Session,
+}
+
+impl Written<'_> {
+    fn path(&self, case: &Case, extension: &str) -> PathBuf {
+        self.dir
+            .join(format!("lattice-{}.{extension}", case.stem()))
+    }
+
+    fn sites(&self, case: &Case, sites: &Sites) -> Result<()> {
+        for format in self.formats {
+            match format {
+                Export::Vtk => vtk::write_lattice(&self.path(case, "vtk"), sites)?,
+                Export::Lammps => {
+                    let path = self.path(case, "data");
+                    let worst = lammps::write(&path, sites, self.tissue)?;
+                    self.session.say(binned(&path, worst));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn pieces(&self, case: &Case, pieces: &Pieces) -> Result<()> {
+        for format in self.formats {
+            match format {
+                Export::Vtk => vtk::write_pieces(&self.path(case, "vtk"), pieces)?,
+                Export::Lammps => return Err(lammps::pieces()),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What was written, and how far its stiffnesses are rounded.
+pub(super) fn binned(path: &Path, worst: f64) -> String {
+    let rounded = match worst > 0.0 {
+        true => format!(
+            ": stiffnesses are rounded to those of their bins, by {:.2} % at most (--bins)",
+            100.0 * worst
+        ),
+        false => String::new(),
+    };
+    format!("wrote {}{rounded}", path.display())
+}
+
+/// The settings that `lattice` left in `dir`; the defaults where it was not run.
+///
+/// # Errors
+/// A `lattice.json` that cannot be read.
+pub fn settings(dir: &Path) -> Result<LatticeParams> {
+    let path = dir.join(RECORD);
+    if !path.exists() {
+        return Ok(LatticeParams::default());
+    }
+    let again = "run `bonepd-ct lattice` again, or delete the file";
+    let text = std::fs::read(&path)
+        .map_err(|e| Error::file(&path, format!("cannot be read: {e}"), again))?;
+    let record: Record = serde_json::from_slice(&text)
+        .map_err(|e| Error::file(&path, format!("not a lattice record: {e}"), again))?;
+    Ok(record.settings)
+}

@@ -1,0 +1,25 @@
+//! Recipes on real scans: each verb of the program is one function here, from paths and settings to files.
+
+pub mod adaptive;
+pub mod estimate;
+pub mod host;
+pub mod info;
+pub mod lattice;
+pub mod meter;
+pub mod phantom;
+pub mod report;
+pub mod scene;
+pub mod segment;
+pub mod session;
+pub mod solve;
+pub mod stiffness;
+
+/// How a command ended when nothing stopped it. Everything else is an [`crate::error::Error`] (exit 2).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Outcome {
+    Done,
+    /// Results are written, their rows marked.
+    NotConverged,
+    /// Names of the scans that failed; the others are done.
+    SomeFailed(Vec<String>),
+}

@@ -1,0 +1,240 @@
+//! Owns `segment` on disk: a scan in, `mask.nii.gz`, `segment.json` and `segment.png` out, and reading them back.
+
+use crate::command::session::Session;
+use crate::draw::picture;
+use crate::error::Result;
+use crate::image::scan;
+use crate::image::scan::Scan;
+use crate::io::atomic;
+use crate::measure::spheres::Spread;
+use crate::pipeline::segment as stage;
+use crate::pipeline::segment::{GreyUnit, SegmentParams, Voi};
+use crate::record::results;
+use crate::record::specimen;
+use crate::record::specimen::{Input, SegmentRecord};
+use crate::volume::{Specimen, Volume};
+use std::path::Path;
+
+/// Segments `input` (a file, or a folder of slices) into `dir`. What is up to date (same input, settings and version)
+/// is kept unless the session forces. `name` overrides the scan's own.
+pub fn segment(
+    input: &Path,
+    dir: &Path,
+    name: Option<&str>,
+    params: &SegmentParams,
+    session: &Session,
+) -> Result<SegmentRecord> {
+    if !session.dry_run {
+        atomic::sweep(dir);
+    }
+    let blake3 = scan::hash(input)?;
+    let voi_blake3 = match &params.voi {
+        Voi::Mask(path) => Some(scan::hash(path)?),
+        _ => None,
+    };
+    if let Some(kept) = specimen::record(dir)
+        && !session.force
+        && name.is_none_or(|name| name == kept.scan)
+        && up_to_date(&kept, dir, params, (&blake3, &voi_blake3))
+    {
+        session.say(format!("{}: up to date", dir.display()));
+        results::set_aside_stale(dir, session);
+        return Ok(kept);
+    }
+    let (scan, voi_mask) = read(input, name, params, session)?;
+    let mut segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
+    let warnings = &mut segmented.summary.warnings;
+    warnings.extend(threshold_in_counts(&scan, params));
+    let record = SegmentRecord {
+        program: env!("CARGO_PKG_NAME").into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        scan: scan.name.clone(),
+        input: Input {
+            path: input.to_path_buf(),
+            blake3,
+            voi_blake3,
+            format: scan.format.clone(),
+            unit: scan.unit.clone(),
+            notes: scan.notes.clone(),
+        },
+        settings: params.clone(),
+        results: segmented.summary,
+    };
+    say(&record, session);
+    if !session.dry_run {
+        write(dir, &record, &segmented.scan, &segmented.specimen)?;
+        results::set_aside_stale(dir, session);
+    }
+    Ok(record)
+}
+
+/// Reads and segments; nothing is written.
+///
+/// # Errors
+/// As [`segment`].
+pub fn in_memory(
+    input: &Path,
+    name: Option<&str>,
+    params: &SegmentParams,
+    session: &Session,
+) -> Result<Specimen> {
+    let (scan, voi_mask) = read(input, name, params, session)?;
+    if let Some(warning) = threshold_in_counts(&scan, params) {
+        session.warn_of(Some(&scan.name), warning);
+    }
+    Ok(stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?.specimen)
+}
+
+/// The scan, and the mask that is its volume of interest, if one is.
+fn read(
+    input: &Path,
+    name: Option<&str>,
+    params: &SegmentParams,
+    session: &Session,
+) -> Result<(Scan, Option<Volume<u8>>)> {
+    let mut scan = scan::read_in(input, params.spacing_mm, params.units)?;
+    if let Some(name) = name {
+        scan.name = name.to_owned();
+    }
+    scan.notes
+        .iter()
+        .for_each(|note| session.say(format!("{}: {note}", scan.name)));
+    let voi_mask = match &params.voi {
+        Voi::Mask(path) => Some(specimen::read_mask(
+            path,
+            Some(scan.volume.grid.spacing_mm),
+        )?),
+        _ => None,
+    };
+    Ok((scan, voi_mask))
+}
+
+/// A threshold that was meant in HU and taken in a scanner's counts selects something else, and nothing looks amiss: said
+/// unless counts were asked for.
+fn threshold_in_counts(scan: &Scan, params: &SegmentParams) -> Option<String> {
+    let calibration = scan.calibration?;
+    let stored = scan.unit.as_deref() == Some("native");
+    if !stored || !params.has_window() || params.units == Some(GreyUnit::Native) {
+        return None;
+    }
+    let bounds = [("lower", params.lower), ("upper", params.upper)];
+    let said = |line: Option<([f64; 2], &str)>| -> String {
+        let words = bounds.iter().filter_map(|&(name, bound)| match line {
+            None => Some(format!("{name} {}", bound?)),
+            Some(([slope, intercept], unit)) => {
+                Some(format!("{name} {:.1} {unit}", slope * bound? + intercept))
+            }
+        });
+        words.collect::<Vec<_>>().join(", ")
+    };
+    let hu = calibration.line(GreyUnit::Hu, &scan.path).ok();
+    let counts = said(None);
+    Some(match hu {
+        Some(line) => format!(
+            "the threshold ({counts}) was taken in the scanner's stored counts, not in HU: by the file's calibration it is {}. If it was meant in HU, give --units hu (in a recipe: units = \"hu\"); for mg HA/cm³ mgha, and native if counts are meant",
+            said(Some(line))
+        ),
+        None => format!(
+            "the threshold ({counts}) was taken in the scanner's stored counts: the file holds no calibration to HU. Give it in counts, with --units native, or a file that kept its calibration"
+        ),
+    })
+}
+
+/// The specimen that `segment` left in `dir`.
+pub fn load(dir: &Path) -> Result<Specimen> {
+    specimen::load(dir)
+}
+
+fn up_to_date(
+    kept: &SegmentRecord,
+    dir: &Path,
+    params: &SegmentParams,
+    (blake3, voi_blake3): (&String, &Option<String>),
+) -> bool {
+    kept.version == env!("CARGO_PKG_VERSION")
+        && kept.settings == *params
+        && kept.input.blake3 == *blake3
+        && kept.input.voi_blake3 == *voi_blake3
+        && dir.join(specimen::MASK).is_file()
+        && dir.join(specimen::PICTURE).is_file()
+        && (!params.keeps_grey() || dir.join(specimen::GREY).is_file())
+}
+
+fn write(
+    dir: &Path,
+    record: &SegmentRecord,
+    scan: &Volume<f32>,
+    specimen: &Specimen,
+) -> Result<()> {
+    atomic::create_dir(dir)?;
+    // An old record must not vouch for a new mask, should the program be stopped between the two.
+    let _ = std::fs::remove_file(dir.join(specimen::RECORD));
+    picture::write(&dir.join(specimen::PICTURE), scan, &specimen.bone)?;
+    specimen::write(dir, specimen, record)
+}
+
+fn say(record: &SegmentRecord, session: &Session) {
+    let r = &record.results;
+    let [nx, ny, nz] = r.voxels;
+    session.say(format!(
+        "{}: {nx} × {ny} × {nz} voxels, {}",
+        record.scan, record.input.format
+    ));
+    if r.threshold == "otsu" {
+        session.say(format!(
+            "{}: Otsu's threshold {}",
+            record.scan,
+            r.lower.unwrap_or(f64::NAN)
+        ));
+    }
+    if let Some(turn) = &r.rotation {
+        let [x, y, z] = turn.direction;
+        session.say(format!(
+            "{}: turned by {:.1}°: ({x:.3}, {y:.3}, {z:.3}) of the scan is now z; a box of {:.0} % of its volume",
+            record.scan,
+            turn.angle_deg,
+            100.0 * turn.kept
+        ));
+    }
+    if let Some([low, high]) = r.plane_cut_mm {
+        session.say(format!(
+            "{}: ends cut flat, {low:.3} mm off the lower and {high:.3} mm off the upper",
+            record.scan
+        ));
+    }
+    session.say(format!(
+        "{}: {} bone voxels, BV {:.4} mm³, TV {:.4} mm³ ({}), BV/TV {:.4}; {} voxels in {} smaller pieces removed",
+        record.scan,
+        r.bone_voxels,
+        r.bv_mm3,
+        r.tv_mm3,
+        r.tv_definition,
+        r.bv_tv,
+        r.removed_voxels,
+        if r.removed_voxels > 0 { r.components - 1 } else { 0 },
+    ));
+    if let Some(t) = r.mean_thickness_mm {
+        session.say(format!(
+            "{}: mean strut thickness about {t:.3} mm (2 BV/BS)",
+            record.scan
+        ));
+    }
+    if let Some(m) = &r.morphometry {
+        let mm = |s: &Option<Spread>| {
+            s.as_ref().map_or("NA".into(), |s| {
+                format!("{:.3} ± {:.3} mm", s.mean_mm, s.sd_mm)
+            })
+        };
+        session.say(format!(
+            "{}: Tb.Th {}, Tb.Sp {}, Conn.D {:.2} /mm³, DA {}",
+            record.scan,
+            mm(&m.tb_th),
+            mm(&m.tb_sp),
+            m.conn_d_per_mm3,
+            m.fabric.map_or("NA".into(), |f| format!("{:.3}", f.da)),
+        ));
+    }
+    r.warnings
+        .iter()
+        .for_each(|w| session.warn_of(Some(&record.scan), w));
+}

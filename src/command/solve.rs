@@ -1,0 +1,289 @@
+//! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
+
+use crate::command::lattice::binned;
+use crate::command::meter::Meter;
+use crate::command::segment::load;
+use crate::command::session::Session;
+use crate::command::{estimate, stiffness};
+use crate::error::Result;
+use crate::export::{inp, vti, vtk};
+use crate::image::nifti;
+use crate::io::atomic;
+use crate::measure::morphometry::Morphometry;
+use crate::measure::thickness::plate_thickness_mm;
+use crate::pipeline::apparent::fields::Recorded;
+use crate::pipeline::apparent::tissue::Tissue;
+use crate::pipeline::apparent::{Load, Method, SolveParams, lattice, voxel_fe};
+use crate::pipeline::lattice::{Boundary, Case, LatticeParams};
+use crate::record::results::Results;
+use crate::record::specimen;
+use crate::result::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapolated};
+use crate::result::ffb::with_ffb;
+use crate::result::row::Row;
+use crate::solver::cg::CgStep;
+use crate::volume::Specimen;
+use indicatif::ProgressBar;
+use std::path::Path;
+
+/// Solves every structure × lattice parameter × boundary for the specimen in `dir`. Rows already there for the same
+/// mask and settings are kept unless the session forces.
+///
+/// # Errors
+/// A folder that is not a segmented scan, settings that do not fit it, an unwritable folder. Not converging is no error:
+/// the row says so.
+pub fn solve(
+    dir: &Path,
+    lattices: &LatticeParams,
+    params: &SolveParams,
+    session: &Session,
+) -> Result<Vec<Row>> {
+    lattices.check()?;
+    params.check()?;
+    if !session.dry_run {
+        atomic::sweep(dir);
+    }
+    let specimen = loaded(dir, params)?;
+    let tissue = Tissue::of(&specimen, params)?;
+    let settings = tissue.label(params.row(&specimen), params);
+    drop(tissue);
+    if params.method == Method::Lattice {
+        warn_of_coarse(dir, lattices, session);
+    }
+    let mean_thickness_mm = plate_thickness_mm(&specimen.bone);
+    let morphometry = specimen::record(dir).and_then(|record| record.results.morphometry);
+    let mut results = Results::open(dir, session.force)?;
+    let mut rows = Vec::new();
+    for job in jobs(lattices, params) {
+        let settings = Row {
+            mean_thickness_mm,
+            ..settings.clone()
+        };
+        let blank = job.label(&specimen, params, settings);
+        let kept = results.find(&blank, params);
+        let mut row = match kept
+            .filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params))
+            // Fields are written over by the next solve: whether those there are these is not known.
+            .filter(|_| params.fields.is_empty())
+        {
+            Some(row) => row,
+            None if session.dry_run => {
+                estimate::refuse_what_does_not_fit(&specimen, job.case(), params)?;
+                let mib = estimate::of_solve_mib(&specimen, job.case(), params)?;
+                session.say(format!(
+                    "would solve {} {} mm, about {mib:.0} MiB",
+                    job.name(&blank),
+                    blank.lp_mm
+                ));
+                continue;
+            }
+            None => {
+                estimate::refuse_what_does_not_fit(&specimen, job.case(), params)?;
+                solve_job(dir, &specimen, &job, &blank, params, session)?
+            }
+        };
+        mark(&mut row, morphometry.as_ref());
+        session.say(in_words(&row));
+        results.keep(&blank, params, &row)?;
+        rows.push(row);
+    }
+    let all = with_extrapolated(&with_ffb(&rows));
+    for row in all.iter().filter(|row| is_extrapolated(row)) {
+        session.say(in_words(row));
+    }
+    Ok(all)
+}
+
+/// With grey values where the material asks for them.
+fn loaded(dir: &Path, params: &SolveParams) -> Result<Specimen> {
+    let mut specimen = load(dir)?;
+    if params.material.is_some() {
+        specimen.grey = specimen::load_grey(dir, &specimen.bone)?;
+    }
+    Ok(specimen)
+}
+
+/// Writes the voxel elements of the specimen in `dir`, with materials (at most `bins` moduli), supports and load, to
+/// `dir/voxel-fe.inp`.
+///
+/// # Errors
+/// A method or load without such a model, an unwritable file.
+pub fn export_inp(dir: &Path, params: &SolveParams, bins: usize, session: &Session) -> Result<()> {
+    params.check()?;
+    let path = dir.join("voxel-fe.inp");
+    if session.dry_run {
+        session.say(format!("would write {}", path.display()));
+        return Ok(());
+    }
+    let worst = inp::write(&path, &loaded(dir, params)?, params, bins)?;
+    session.say(binned(&path, worst));
+    Ok(())
+}
+
+/// Struts thinner than two lattice parameters are one or two sites thick, which graded lattices make up for.
+fn warn_of_coarse(dir: &Path, lattice: &LatticeParams, session: &Session) {
+    if lattice.boundary.iter().all(|b| *b == Boundary::Graded) {
+        return;
+    }
+    let thickness = specimen::record(dir).and_then(|record| record.results.mean_thickness_mm);
+    let Some(thickness) = thickness else { return };
+    let coarse = lattice.lp_mm.iter().filter(|lp| **lp > 0.5 * thickness);
+    let coarse: Vec<String> = coarse.map(f64::to_string).collect();
+    if !coarse.is_empty() {
+        session.warn(format!(
+            "lattice parameters {} mm exceed half the mean strut thickness ({thickness:.3} mm): E_app is far from converged there",
+            coarse.join(", ")
+        ));
+    }
+}
+
+/// Puts the specimen's morphometry beside its modulus.
+fn mark(row: &mut Row, measured: Option<&Morphometry>) {
+    row.tb_th_mm = measured.and_then(|m| Some(m.tb_th.as_ref()?.mean_mm));
+    row.tb_sp_mm = measured.and_then(|m| Some(m.tb_sp.as_ref()?.mean_mm));
+    row.conn_d_per_mm3 = measured.map(|m| m.conn_d_per_mm3);
+    row.da = measured.and_then(|m| Some(m.fabric.as_ref()?.da));
+}
+
+/// One row to solve.
+enum Job {
+    Lattice(Case),
+    VoxelFe,
+}
+
+fn jobs(lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {
+    match params.method {
+        Method::Lattice => lattices.cases().into_iter().map(Job::Lattice).collect(),
+        Method::VoxelFe => vec![Job::VoxelFe],
+    }
+}
+
+impl Job {
+    /// The columns that tell what was solved.
+    fn label(&self, specimen: &Specimen, params: &SolveParams, row: Row) -> Row {
+        match self {
+            Job::Lattice(case) => lattice::label(row, case),
+            Job::VoxelFe => voxel_fe::label(row, specimen, params),
+        }
+    }
+
+    fn case(&self) -> Option<&Case> {
+        match self {
+            Job::Lattice(case) => Some(case),
+            Job::VoxelFe => None,
+        }
+    }
+
+    fn is_stiffness(&self, params: &SolveParams) -> bool {
+        matches!(self, Job::VoxelFe) && params.load == Load::Stiffness
+    }
+
+    fn name(&self, row: &Row) -> String {
+        match self {
+            Job::Lattice(case) => format!("{} {}", row.structure, case.boundary.name()),
+            Job::VoxelFe => row.structure.clone(),
+        }
+    }
+}
+
+fn solve_job(
+    dir: &Path,
+    specimen: &Specimen,
+    job: &Job,
+    blank: &Row,
+    params: &SolveParams,
+    session: &Session,
+) -> Result<Row> {
+    let meter = Meter::start();
+    let bar = session.bar(1000, &format!("{} {} mm", job.name(blank), blank.lp_mm));
+    if job.is_stiffness(params) {
+        let observe = |load: usize, step| show_load(&bar, load, step, params.tolerance);
+        let row = stiffness::solve(dir, specimen, params, blank, session, observe)?;
+        bar.finish_and_clear();
+        return Ok(Row {
+            wall_s: Some(meter.wall_s()),
+            peak_mib: meter.peak_mib(),
+            ..row
+        });
+    }
+    let observe = |step| show(&bar, step, params.tolerance);
+    let (solved, recorded) = match job {
+        Job::Lattice(case) => {
+            let (solved, fields) = lattice::solve_recorded(specimen, case, params, observe)?;
+            if let Some(fields) = fields {
+                let name = case.stem();
+                vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), &name, &fields)?;
+            }
+            (solved, Recorded::default())
+        }
+        Job::VoxelFe => voxel_fe::solve_recorded(specimen, params, observe)?,
+    };
+    bar.finish_and_clear();
+    write_fields(dir, &recorded)?;
+    let row = solved.row(blank.clone());
+    Ok(Row {
+        wall_s: Some(meter.wall_s()),
+        peak_mib: meter.peak_mib(),
+        discretization_error_mpa: voxel_fe_error(&row),
+        failure_load_n: recorded.failure.map(|f| f.load_n),
+        failure_factor: recorded.failure.map(|f| f.factor),
+        ..row
+    })
+}
+
+/// `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView.
+fn write_fields(dir: &Path, recorded: &Recorded) -> Result<()> {
+    for field in &recorded.fields {
+        let file = format!("field-{}.nii.gz", field.name.replace('_', "-"));
+        nifti::write(&dir.join(file), &field.values)?;
+    }
+    let arrays: Vec<_> = recorded
+        .fields
+        .iter()
+        .map(|f| (f.name, &f.values))
+        .collect();
+    vti::write(&dir.join("fields.vti"), &arrays)
+}
+
+/// Progress is the share of the error's decades already gained.
+fn show(bar: &ProgressBar, step: CgStep, tolerance: f64) {
+    if let Some(error) = step.energy_error.filter(|e| *e > 0.0) {
+        let gained = (error.log10() / tolerance.log10()).clamp(0.0, 1.0);
+        bar.set_position((1000.0 * gained) as u64);
+        bar.set_message(format!("iteration {}, error {:.1e}", step.iteration, error));
+    }
+}
+
+/// The same over six loads.
+fn show_load(bar: &ProgressBar, load: usize, step: CgStep, tolerance: f64) {
+    if let Some(error) = step.energy_error.filter(|e| *e > 0.0) {
+        let gained = (error.log10() / tolerance.log10()).clamp(0.0, 1.0);
+        bar.set_position((1000.0 * (load as f64 + gained) / 6.0) as u64);
+        bar.set_message(format!("strain {} of 6, error {error:.1e}", load + 1));
+    }
+}
+
+pub(super) fn in_words(row: &Row) -> String {
+    let number = |v: Option<f64>, digits: usize| v.map_or("NA".into(), |v| format!("{v:.digits$}"));
+    let note = row
+        .note
+        .as_ref()
+        .map_or(String::new(), |n| format!("  ({n})"));
+    let discretization = row
+        .discretization_error_mpa
+        .map_or(String::new(), |e| format!(" ± {e:.3} (discretisation)"));
+    let failure = row
+        .failure_load_n
+        .map_or(String::new(), |load| format!("  failure load {load:.3} N"));
+    format!(
+        "{} {:<8} {:<12} {:>6} mm  E_app {:>9} MPa ± {:<7}{discretization} {:>9} sites {:>6} iterations {:>7} s{failure}{note}",
+        row.scan,
+        row.structure,
+        row.boundary.as_deref().unwrap_or(""),
+        row.lp_mm,
+        number(row.e_app_mpa, 3),
+        number(row.algebraic_error_mpa, 3),
+        row.sites.unwrap_or(0),
+        row.iterations.unwrap_or(0),
+        number(row.wall_s, 2),
+    )
+}

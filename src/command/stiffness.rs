@@ -1,0 +1,115 @@
+//! Owns `solve --load stiffness` on disk: `stiffness.json`, and what of it goes into a row of `results.csv`.
+
+use crate::command::session::Session;
+use crate::error::Result;
+use crate::measure::stiffness::{orthotropic, young_along};
+use crate::pipeline::apparent::SolveParams;
+use crate::pipeline::apparent::stiffness::{Stiffness, solve_stiffness};
+use crate::record::specimen::MASK;
+use crate::record::stiffness as file;
+use crate::record::stiffness::StiffnessRecord;
+use crate::result::row::Row;
+use crate::solver::cg::CgStep;
+use crate::volume::Specimen;
+use std::path::Path;
+
+pub const RECORD: &str = "stiffness.json";
+
+/// Whether the matrix in `dir` follows from these settings and this mask.
+pub fn is_there(dir: &Path, params: &SolveParams) -> bool {
+    file::record(&dir.join(RECORD)).is_some_and(|record| {
+        record.settings == *params
+            && record.version == env!("CARGO_PKG_VERSION")
+            && mask_blake3(dir).is_ok_and(|hash| hash == record.mask_blake3)
+    })
+}
+
+/// Solves the six unit strains, writes `stiffness.json` and completes the row: E_app is Young's modulus along the load
+/// axis that follows from the matrix.
+pub fn solve(
+    dir: &Path,
+    specimen: &Specimen,
+    params: &SolveParams,
+    blank: &Row,
+    session: &Session,
+    observe: impl FnMut(usize, CgStep),
+) -> Result<Row> {
+    let solved = solve_stiffness(specimen, params, observe)?;
+    let record = StiffnessRecord {
+        program: env!("CARGO_PKG_NAME").to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        scan: specimen.name.clone(),
+        mask_blake3: mask_blake3(dir)?,
+        settings: params.clone(),
+        boundary_conditions: params.conditions.in_words().to_owned(),
+        voigt_order: StiffnessRecord::voigt_order(),
+        element_mm: specimen
+            .bone
+            .grid
+            .spacing_mm
+            .map(|h| h * params.coarsen as f64 / params.refine as f64),
+        bv_tv: specimen.bv_tv(),
+        converged: solved.ended.converged(),
+        iterations: solved.iterations,
+        residual: solved.residual,
+        stiffness_mpa: solved.matrix_mpa,
+        algebraic_error_mpa: solved.error_mpa,
+        asymmetry_mpa: solved.asymmetry_mpa,
+        orthotropic: orthotropic(&solved.matrix_mpa),
+    };
+    file::write(&dir.join(RECORD), &record)?;
+    say(&record, session);
+    Ok(row(&solved, params, blank))
+}
+
+fn row(solved: &Stiffness, params: &SolveParams, blank: &Row) -> Row {
+    let (e_app, error) = young_along(&solved.matrix_mpa, &solved.error_mpa, params.axis);
+    let mut note = format!(
+        "E along {} of the matrix in {RECORD}; {}",
+        params.axis.name(),
+        params.conditions.in_words()
+    );
+    if e_app == 0.0 {
+        note += "; the matrix is not positive definite: bone does not join all faces";
+    }
+    if !solved.ended.converged() {
+        note += "; not converged";
+    }
+    Row {
+        sites: Some(solved.elements as u64),
+        dropped_sites: Some(solved.dropped as u64),
+        unknowns: Some(solved.unknowns as u64),
+        iterations: Some(solved.iterations.iter().sum::<usize>() as u64),
+        residual: Some(solved.residual),
+        converged: Some(solved.ended.converged()),
+        e_app_mpa: Some(e_app),
+        algebraic_error_mpa: Some(error),
+        note: Some(note),
+        ..blank.clone()
+    }
+}
+
+fn say(record: &StiffnessRecord, session: &Session) {
+    session.say(format!(
+        "{}: apparent stiffness in MPa (11, 22, 33, 23, 13, 12), {}",
+        record.scan, record.boundary_conditions
+    ));
+    for row in &record.stiffness_mpa {
+        let words: Vec<String> = row.iter().map(|c| format!("{c:>10.3}")).collect();
+        session.say(words.join(" "));
+    }
+    if let Some(o) = &record.orthotropic {
+        let list = |v: &[f64; 3]| v.map(|x| format!("{x:.3}")).join(", ");
+        session.say(format!(
+            "orthotropic: E1, E2, E3 {} MPa; G23, G13, G12 {} MPa; nu23, nu13, nu12 {}; {:.1} % of the tensor is not orthotropic",
+            list(&o.young_mpa),
+            list(&o.shear_mpa),
+            list(&o.poisson),
+            100.0 * o.residual
+        ));
+    }
+}
+
+fn mask_blake3(dir: &Path) -> Result<String> {
+    crate::image::scan::hash(&dir.join(MASK))
+}

@@ -1,0 +1,214 @@
+//! Owns the export of voxel elements as a CalculiX or Abaqus input file: nodes, C3D8 bricks, materials, supports, load,
+//! and the printing of the moving grip's force. mm, N, MPa.
+
+use crate::discretisation::voxels::{Planes, VoxelMesh};
+use crate::error::{Error, Result};
+use crate::export::bins::Bins;
+use crate::io::atomic;
+use crate::operator::held::Held;
+use crate::pipeline::apparent::bricks::{Bricks, Keep};
+use crate::pipeline::apparent::tissue::Tissue;
+use crate::pipeline::apparent::voxel_fe::supports;
+use crate::pipeline::apparent::{Ends, Load, Method, SolveParams};
+use crate::volume::Specimen;
+use std::io::Write;
+use std::path::Path;
+
+/// Corners of a C3D8 brick in its own order.
+const CORNERS: [[u32; 3]; 8] = [
+    [0, 0, 0],
+    [1, 0, 0],
+    [1, 1, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 0, 1],
+    [1, 1, 1],
+    [0, 1, 1],
+];
+
+/// Writes the elements that join the grips. With free ends two nodes of the lower grip are pinned sideways, which stops
+/// the rigid motions that are left and bears nothing. Moduli that differ come to at most `bins` materials per Poisson's
+/// ratio; returned is by what share the element farthest from its material is off.
+///
+/// # Errors
+/// A method or load that has no such file; a specimen that does not join the grips; an unwritable file.
+pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize) -> Result<f64> {
+    let wrong = |found: &str, advice: &str| Err(Error::setting("--export inp", found, advice));
+    if params.method != Method::VoxelFe {
+        return wrong("lattices have no bricks", "add --method voxel-fe");
+    }
+    if params.load == Load::Stiffness {
+        return wrong(
+            "six unit strains are six models",
+            "use --load uniaxial or confined",
+        );
+    }
+    let model = Bricks::new(specimen, params, Keep::BetweenGrips)?;
+    let mesh = model.mesh();
+    if mesh.is_empty() {
+        return Err(Error::specimen(
+            "no path of bone between the loaded faces",
+            "there is nothing to export",
+        ));
+    }
+    let grips = Planes::within(&mesh.grid, params.axis, params.grip_mm)?;
+    let (young_mpa, poissons) = match Tissue::of(specimen, params)? {
+        Tissue::Uniform(solid) => (solid.young_mpa, vec![solid.poisson]),
+        Tissue::Mixed(mixed) => (mixed.mean_mpa, mixed.poissons),
+    };
+    let stiffness: Vec<(f64, u8)> = corners(mesh)
+        .map(|node| {
+            let (factor, kind) = model.stiffness_of(node);
+            (young_mpa * f64::from(factor), kind)
+        })
+        .collect();
+    let materials = Materials::of(&stiffness, &poissons, bins.max(1));
+    atomic::write_with(path, |out| fill(out, mesh, grips, params, &materials))?;
+    Ok(materials.worst)
+}
+
+/// The node of smallest x, y, z of each element, in the order of the elements.
+fn corners(mesh: &VoxelMesh) -> impl Iterator<Item = usize> {
+    let nodes = mesh.segments.iter().flat_map(|segment| segment.nodes());
+    nodes.filter(|&node| mesh.around[node] & 0x80 != 0)
+}
+
+/// Materials by number, and that of each element.
+struct Materials {
+    /// MPa, and Poisson's ratio.
+    table: Vec<(f64, f64)>,
+    of: Vec<usize>,
+    worst: f64,
+}
+
+impl Materials {
+    fn of(stiffness: &[(f64, u8)], poissons: &[f64], bins: usize) -> Materials {
+        let young: Vec<f64> = stiffness.iter().map(|s| s.0).collect();
+        let bins = Bins::of(&young, bins);
+        let mut number = vec![None; bins.values.len() * poissons.len()];
+        let mut table = Vec::new();
+        let of = stiffness.iter().zip(&bins.of).map(|(&(_, kind), &bin)| {
+            let (bin, kind) = (bin as usize, usize::from(kind));
+            *number[bin * poissons.len() + kind].get_or_insert_with(|| {
+                table.push((bins.values[bin], poissons[kind]));
+                table.len() - 1
+            })
+        });
+        Materials {
+            of: of.collect(),
+            worst: bins.worst,
+            table,
+        }
+    }
+}
+
+fn fill(
+    out: &mut impl Write,
+    mesh: &VoxelMesh,
+    grips: Planes,
+    params: &SolveParams,
+    materials: &Materials,
+) -> std::io::Result<()> {
+    let axis = params.axis.index();
+    let gauge_mm = (grips.high - grips.low) as f64 * mesh.grid.spacing_mm[axis];
+    let (held, u) = supports(mesh, grips, params, params.strain * gauge_mm);
+    writeln!(
+        out,
+        "** {} elements; mm, N, MPa; E_app = force of HIGH x {gauge_mm} mm / (area x {} mm)",
+        mesh.elements,
+        params.strain * gauge_mm
+    )?;
+    writeln!(out, "*NODE, NSET=ALL")?;
+    let nodes = || (0..mesh.len()).filter(|&node| mesh.around[node] != 0);
+    for node in nodes() {
+        let [x, y, z] = mesh.position(node);
+        writeln!(out, "{}, {x:.10}, {y:.10}, {z:.10}", node + 1)?;
+    }
+    for (material, (young_mpa, poisson)) in materials.table.iter().enumerate() {
+        let name = 1 + material;
+        writeln!(out, "*ELEMENT, TYPE=C3D8, ELSET=BONE{name}")?;
+        elements(out, mesh, |element| materials.of[element] == material)?;
+        writeln!(
+            out,
+            "*MATERIAL, NAME=TISSUE{name}\n*ELASTIC\n{young_mpa}, {poisson}\n*SOLID SECTION, ELSET=BONE{name}, MATERIAL=TISSUE{name}"
+        )?;
+    }
+    writeln!(out, "*NSET, NSET=HIGH")?;
+    for node in nodes().filter(|&n| mesh.indices(n)[axis] as usize >= grips.high) {
+        writeln!(out, "{},", node + 1)?;
+    }
+    writeln!(out, "*STEP\n*STATIC\n*BOUNDARY")?;
+    boundary(out, mesh, &held, &u)?;
+    if params.load == Load::Uniaxial && params.ends == Ends::Free {
+        for (node, component) in pins(mesh, grips) {
+            writeln!(out, "{}, {c}, {c}, 0.0", node + 1, c = component + 1)?;
+        }
+    }
+    writeln!(out, "*NODE PRINT, NSET=HIGH, TOTALS=ONLY\nRF\n*END STEP")
+}
+
+fn elements(
+    out: &mut impl Write,
+    mesh: &VoxelMesh,
+    wanted: impl Fn(usize) -> bool,
+) -> std::io::Result<()> {
+    let mut number = 0;
+    for segment in &mesh.segments {
+        for i in 0..segment.len {
+            if mesh.around[(segment.start + i) as usize] & 0x80 == 0 {
+                continue;
+            }
+            number += 1;
+            if !wanted(number - 1) {
+                continue;
+            }
+            write!(out, "{number}")?;
+            for [x, y, z] in CORNERS {
+                // Row (dy, dz) of neighbours, at this node's own x.
+                let row = segment.rows[(1 + y + 3 * (1 + z)) as usize];
+                write!(out, ", {}", row + i + x + 1)?;
+            }
+            writeln!(out)?;
+        }
+    }
+    Ok(())
+}
+
+fn boundary(
+    out: &mut impl Write,
+    mesh: &VoxelMesh,
+    held: &Held,
+    u: &[[f64; 3]],
+) -> std::io::Result<()> {
+    for (node, u) in u.iter().enumerate() {
+        for (c, value) in u.iter().enumerate() {
+            if mesh.around[node] != 0 && held.is_held(node, c) {
+                // CalculiX reads 20 characters of a number.
+                writeln!(out, "{}, {c}, {c}, {value:.11e}", node + 1, c = c + 1)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Two components of one node of the lower grip, and one of that farthest from it: across the line between them.
+fn pins(mesh: &VoxelMesh, grips: Planes) -> Vec<(usize, usize)> {
+    let axis = grips.axis.index();
+    let (p, q) = ((axis + 1) % 3, (axis + 2) % 3);
+    let low = |n: &usize| mesh.around[*n] != 0 && mesh.indices(*n)[axis] as usize <= grips.low;
+    let Some(first) = (0..mesh.len()).find(low) else {
+        return Vec::new();
+    };
+    let apart = |n: usize, a: usize| (mesh.position(n)[a] - mesh.position(first)[a]).abs();
+    let distance = |n: &usize| apart(*n, p).hypot(apart(*n, q));
+    let last = (0..mesh.len())
+        .filter(low)
+        .max_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(first);
+    let across = if apart(last, p) > apart(last, q) {
+        q
+    } else {
+        p
+    };
+    vec![(first, p), (first, q), (last, across)]
+}

@@ -1,0 +1,336 @@
+//! Owns the one way in: any scan, file or folder, to grey values on a grid in millimetres.
+
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::image::orient;
+use crate::image::orient::Affine;
+use crate::image::scanco::Calibration;
+use crate::image::scanco::{aim, isq};
+use crate::image::{dicom, metaimage, nifti, npy, nrrd, slices, tiff};
+use crate::pipeline::segment::GreyUnit;
+use crate::volume::Volume;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// What a reader found in a file, axes as stored.
+#[derive(Debug, Clone, Default)]
+pub struct Stored {
+    /// Format and storage type, as `NIfTI-1 (gzip), int16`.
+    pub format: String,
+    pub n: [usize; 3],
+    /// x fastest.
+    pub values: Vec<f32>,
+    /// None where the file does not say.
+    pub spacing_mm: Option<[f64; 3]>,
+    /// None where the file has no orientation.
+    pub affine: Option<Affine>,
+    /// Unit of the grey values where known: `HU`, `mg HA/cm3`.
+    pub unit: Option<String>,
+    /// From stored values to HU and density, where the format has its own.
+    pub calibration: Option<Calibration>,
+    /// Further facts for `info`, key and value. Never names of persons.
+    pub details: Vec<(String, String)>,
+    pub notes: Vec<String>,
+}
+
+/// A scan, ready to be segmented.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    /// The file's or folder's name without extensions.
+    pub name: String,
+    pub path: PathBuf,
+    pub format: String,
+    pub unit: Option<String>,
+    /// What the file holds to turn stored values into HU and density, whether it was asked for or not.
+    pub calibration: Option<Calibration>,
+    /// Axes x, y, z canonical where the file has an orientation, else as stored. May hold NaN and infinities.
+    pub volume: Volume<f32>,
+    pub details: Vec<(String, String)>,
+    /// What a user should know of how the file was understood.
+    pub notes: Vec<String>,
+}
+
+/// Reads a scan in its own units. `spacing_mm` (x, y, z of the canonical axes) overrides the file's voxel size.
+pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
+    read_in(path, spacing_mm, None)
+}
+
+/// The same with a Scanco scan's grey values in `unit`; None: as stored.
+pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>) -> Result<Scan> {
+    let mut stored = stored(path)?;
+    calibrate(&mut stored, unit.unwrap_or(GreyUnit::Native), path)?;
+    let mut notes = stored.notes;
+    let found = stored
+        .spacing_mm
+        .filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));
+    let Some(spacing) = found.or(spacing_mm) else {
+        return Err(Error::file(
+            path,
+            format!(
+                "{} without a voxel size: the file does not carry one",
+                stored.format
+            ),
+            "give it with --spacing MM (for example --spacing 0.0195)",
+        ));
+    };
+    let grid = Grid::new(stored.n, spacing);
+    let mut volume = match stored.affine {
+        Some(affine) => orient::canonical(grid, stored.values, affine, &mut notes),
+        None => Volume::from_vec(grid, stored.values),
+    };
+    if let Some(wanted) = spacing_mm {
+        respace(
+            &mut volume,
+            checked_spacing(wanted)?,
+            found.is_some(),
+            &mut notes,
+        );
+    }
+    Ok(Scan {
+        name: name(path),
+        path: path.to_path_buf(),
+        format: stored.format,
+        unit: stored.unit,
+        calibration: stored.calibration,
+        volume,
+        details: stored.details,
+        notes,
+    })
+}
+
+/// Values with their axes as stored, whatever the orientation says: masks and grey values of a segmented scan, which may
+/// have been turned. `spacing_mm` is the voxel size.
+pub fn read_as_stored(path: &Path, spacing_mm: [f64; 3]) -> Result<Volume<f32>> {
+    let stored = stored(path)?;
+    let mut volume = Volume::from_vec(Grid::new(stored.n, spacing_mm), stored.values);
+    volume.affine = stored.affine;
+    Ok(volume)
+}
+
+/// Files of other formats hold the unit they were saved in: nothing to convert, but a contradiction is an error.
+fn calibrate(stored: &mut Stored, unit: GreyUnit, path: &Path) -> Result<()> {
+    let Some(calibration) = stored.calibration else {
+        let asked = match unit {
+            GreyUnit::Native | GreyUnit::HuWhereKnown => return Ok(()),
+            GreyUnit::Hu => "HU",
+            GreyUnit::Mgha => "mg HA/cm3",
+        };
+        return match stored.unit.as_deref() {
+            Some(found) if found == asked => Ok(()),
+            found => Err(Error::file(
+                path,
+                format!(
+                    "holds no calibration to {asked} (its unit: {})",
+                    found.unwrap_or("not told")
+                ),
+                "use --units native, with a threshold in the file's own values",
+            )),
+        };
+    };
+    let ([slope, intercept], name) = match (unit, calibration.line(unit, path)) {
+        (GreyUnit::HuWhereKnown, Err(_)) => calibration.line(GreyUnit::Native, path)?,
+        (_, line) => line?,
+    };
+    if [slope, intercept] != [1.0, 0.0] {
+        stored
+            .values
+            .par_iter_mut()
+            .for_each(|v| *v = (slope * f64::from(*v) + intercept) as f32);
+    }
+    stored.unit = Some(name.into());
+    Ok(())
+}
+
+/// What a file or folder holds, axes as stored.
+pub fn stored(path: &Path) -> Result<Stored> {
+    let meta = std::fs::metadata(path).map_err(|e| {
+        Error::file(
+            path,
+            format!("cannot be read: {e}"),
+            "check the path and its permissions",
+        )
+    })?;
+    if meta.is_dir() {
+        return slices::read(path);
+    }
+    match kind(path) {
+        Some(Kind::Nifti) => nifti::read(path),
+        Some(Kind::Tiff) => tiff::read(path),
+        Some(Kind::MetaImage) => metaimage::read(path),
+        Some(Kind::Nrrd) => nrrd::read(path),
+        Some(Kind::Npy) => npy::read(path),
+        Some(Kind::Aim) => aim::read(path),
+        Some(Kind::Isq) => isq::read(path),
+        Some(Kind::Dicom) => dicom::read(path, &[path.to_path_buf()]),
+        None => Err(Error::file(
+            path,
+            "is not a scan format that is read",
+            "give NIfTI, TIFF, MetaImage, NRRD, AIM, ISQ, DICOM or NumPy, or a folder of slices (TIFF, PNG, BMP, DICOM)",
+        )),
+    }
+}
+
+/// Formats that are one file each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Nifti,
+    Tiff,
+    MetaImage,
+    Nrrd,
+    Npy,
+    Aim,
+    Isq,
+    Dicom,
+}
+
+/// By its name; `;1` is a version that VMS appends.
+fn kind(path: &Path) -> Option<Kind> {
+    const ENDS: [(&str, Kind); 15] = [
+        (".nii", Kind::Nifti),
+        (".nii.gz", Kind::Nifti),
+        (".hdr", Kind::Nifti),
+        (".hdr.gz", Kind::Nifti),
+        (".tif", Kind::Tiff),
+        (".tiff", Kind::Tiff),
+        (".mha", Kind::MetaImage),
+        (".mhd", Kind::MetaImage),
+        (".nrrd", Kind::Nrrd),
+        (".nhdr", Kind::Nrrd),
+        (".npy", Kind::Npy),
+        (".aim", Kind::Aim),
+        (".isq", Kind::Isq),
+        (".dcm", Kind::Dicom),
+        (".ima", Kind::Dicom),
+    ];
+    let name = path.file_name()?.to_string_lossy().to_lowercase();
+    let name = without_vms_version(&name);
+    ENDS.iter()
+        .find_map(|(end, kind)| name.ends_with(end).then_some(*kind))
+}
+
+/// `scan.aim;1` without its `;1`.
+fn without_vms_version(name: &str) -> &str {
+    match name.rsplit_once(';') {
+        Some((stem, version))
+            if !version.is_empty() && version.bytes().all(|c| c.is_ascii_digit()) =>
+        {
+            stem
+        }
+        _ => name,
+    }
+}
+
+/// True for what [`read`] takes as one file (by its name; the content may still be refused).
+pub fn is_scan_file(path: &Path) -> bool {
+    path.is_file() && kind(path).is_some()
+}
+
+fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {
+    if s.iter().all(|&v| v.is_finite() && v > 0.0) {
+        return Ok(s);
+    }
+    Err(Error::setting(
+        "spacing",
+        format!("{s:?} is no voxel size"),
+        "give millimetres above zero, one for all axes or three",
+    ))
+}
+
+fn respace(volume: &mut Volume<f32>, wanted: [f64; 3], known: bool, notes: &mut Vec<String>) {
+    let old = volume.grid.spacing_mm;
+    if known && (0..3).any(|a| (old[a] / wanted[a] - 1.0).abs() > 1e-3) {
+        notes.push(format!(
+            "voxel size {old:?} mm of the file replaced by {wanted:?} mm as asked"
+        ));
+    }
+    if let Some(affine) = &mut volume.affine {
+        for row in affine {
+            for a in 0..3 {
+                row[a] *= wanted[a] / old[a];
+            }
+        }
+    }
+    volume.grid.spacing_mm = wanted;
+}
+
+/// The scan's name: that of the file or folder, without extensions that formats add.
+pub fn name(path: &Path) -> String {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let full = absolute
+        .file_name()
+        .map_or_else(|| "scan".into(), |n| n.to_string_lossy().into_owned());
+    if path.is_dir() {
+        return full;
+    }
+    let full = without_vms_version(&full);
+    let stem = full.strip_suffix(".gz").unwrap_or(full);
+    match stem.rfind('.') {
+        Some(dot) if dot > 0 => stem[..dot].to_string(),
+        _ => stem.to_string(),
+    }
+}
+
+/// BLAKE3 of the input: of the file (and of the data that a header names), or of the names and contents of a folder's files in natural order.
+pub fn hash(path: &Path) -> Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    if path.is_dir() {
+        for file in slices::files(path)? {
+            let name = file
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            hasher.update(name.as_bytes());
+            hasher.update(hash_file(&file)?.as_bytes());
+        }
+    } else {
+        let Some(data) = data_file(path).filter(|data| data.is_file()) else {
+            return Ok(hash_file(path)?.to_hex().to_string());
+        };
+        hasher.update(hash_file(path)?.as_bytes());
+        hasher.update(hash_file(&data)?.as_bytes());
+    }
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+/// The file of voxels that a header beside it names.
+fn data_file(path: &Path) -> Option<PathBuf> {
+    let name = path.file_name()?.to_string_lossy().to_lowercase();
+    match kind(path)? {
+        Kind::MetaImage if name.ends_with(".mhd") => metaimage::data_file(path),
+        Kind::Nrrd if name.ends_with(".nhdr") => nrrd::data_file(path),
+        Kind::Nifti if name.contains(".hdr") => Some(nifti::image_of(path)),
+        _ => None,
+    }
+}
+
+fn hash_file(path: &Path) -> Result<blake3::Hash> {
+    let mut hasher = blake3::Hasher::new();
+    std::fs::File::open(path)
+        .and_then(|file| hasher.update_reader(file).map(|h| h.finalize()))
+        .map_err(|e| {
+            Error::file(
+                path,
+                format!("cannot be read: {e}"),
+                "check the path and its permissions",
+            )
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lose_only_format_extensions() {
+        for (path, expected) in [
+            ("a/b/femur_01.nii.gz", "femur_01"),
+            ("scan.0195.nii", "scan.0195"),
+            ("stack.tif", "stack"),
+            ("folder", "folder"),
+            ("C0001234.AIM;1", "C0001234"),
+        ] {
+            assert_eq!(name(Path::new(path)), expected);
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Owns the voxel elements of a specimen: their size, equal or graded, and how they are integrated.
+
+use crate::discretisation::voxels::{Planes, VoxelMesh};
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::mask::resample;
+use crate::operator::Operator;
+use crate::operator::coarsen::{Block, Coarsen, VisitRow};
+use crate::physics::hex8::Hex8;
+use crate::physics::hex8::element::Integration;
+use crate::physics::hex8::graded::Graded;
+use crate::pipeline::apparent::SolveParams;
+use crate::pipeline::apparent::tissue::{Mixed, Tissue};
+use crate::volume::Specimen;
+use std::ops::Range;
+
+/// Above this Poisson's ratio the dilatation is averaged over each element: full integration locks as ν → ½.
+pub const LOCKING_POISSON: f64 = 0.4;
+
+/// Bone fraction of a coarsened voxel below which it is no element.
+pub(super) const LEAST_FRACTION: f32 = 0.02;
+
+/// Which elements carry load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keep {
+    /// Those joined to both grips.
+    BetweenGrips,
+    /// Those joined to a face of the volume.
+    AtFaces,
+}
+
+/// One brick per voxel, or finer or coarser ones.
+pub enum Bricks {
+    Equal(Hex8),
+    Graded(Graded),
+}
+
+impl Bricks {
+    /// # Errors
+    /// Grips that meet, or too many nodes.
+    pub fn new(specimen: &Specimen, params: &SolveParams, keep: Keep) -> Result<Self> {
+        let solid = match Tissue::of(specimen, params)? {
+            Tissue::Uniform(solid) => solid,
+            Tissue::Mixed(mixed) => {
+                return Ok(Bricks::Graded(of_mixed(specimen, &mixed, params, keep)?));
+            }
+        };
+        let (young, nu) = (solid.young_mpa, solid.poisson);
+        let rule = rule(nu);
+        if params.coarsen > 1 {
+            let fractions = resample::coarsen(&specimen.bone, params.coarsen);
+            let values = fractions.as_slice();
+            let bone = |f: &f32| *f >= LEAST_FRACTION;
+            let mesh = mesh(fractions.grid, values, bone, params, keep)?;
+            let graded = Graded::new(mesh, young, nu, rule, |e| values[e]);
+            return Ok(Bricks::Graded(graded));
+        }
+        let refined = (params.refine > 1).then(|| resample::refine(&specimen.bone, params.refine));
+        let bone = refined.as_ref().unwrap_or(&specimen.bone);
+        let mesh = mesh(bone.grid, bone.as_slice(), |b| *b != 0, params, keep)?;
+        Ok(Bricks::Equal(Hex8::new(mesh, young, nu, rule)))
+    }
+
+    /// Factor and kind of the element whose corner of smallest x, y, z is a node.
+    pub fn stiffness_of(&self, node: usize) -> (f32, u8) {
+        match self {
+            Bricks::Equal(_) => (1.0, 0),
+            Bricks::Graded(model) => model.stiffness_of(node),
+        }
+    }
+
+    pub fn mesh(&self) -> &VoxelMesh {
+        match self {
+            Bricks::Equal(model) => &model.mesh,
+            Bricks::Graded(model) => model.mesh(),
+        }
+    }
+}
+
+pub(super) fn rule(poisson: f64) -> Integration {
+    if poisson > LOCKING_POISSON {
+        Integration::MeanDilatation
+    } else {
+        Integration::Full
+    }
+}
+
+/// Elements of tissue that differs from voxel to voxel.
+fn of_mixed(
+    specimen: &Specimen,
+    mixed: &Mixed,
+    params: &SolveParams,
+    keep: Keep,
+) -> Result<Graded> {
+    let kinds: Vec<(f64, Integration)> = mixed.poissons.iter().map(|&nu| (nu, rule(nu))).collect();
+    let young = mixed.mean_mpa;
+    if params.coarsen > 1 {
+        if kinds.len() > 1 {
+            return Err(Error::setting(
+                "coarsen",
+                "tissues of different Poisson's ratios would share elements",
+                "solve at full resolution, or give all labels one Poisson's ratio",
+            ));
+        }
+        let fractions = resample::coarsen(&specimen.bone, params.coarsen);
+        let moduli = resample::coarsen_values(&specimen.bone, params.coarsen, &mixed.factor);
+        let bone = |f: &f32| *f >= LEAST_FRACTION;
+        let mesh = mesh(fractions.grid, fractions.as_slice(), bone, params, keep)?;
+        let factor = |e: usize| moduli.as_slice()[e];
+        return Ok(Graded::of_kinds(mesh, young, &kinds, factor, |_| 0));
+    }
+    let n = params.refine;
+    let refined = (n > 1).then(|| resample::refine(&specimen.bone, n));
+    let bone = refined.as_ref().unwrap_or(&specimen.bone);
+    let mesh = mesh(bone.grid, bone.as_slice(), |b| *b != 0, params, keep)?;
+    let (voxels, [nx, ny, _]) = (specimen.bone.grid, bone.grid.n);
+    let voxel = |e: usize| match n {
+        1 => e,
+        _ => voxels.index([e % nx / n, e / nx % ny / n, e / (nx * ny) / n]),
+    };
+    let factor = |e: usize| mixed.factor[voxel(e)];
+    let kind = |e: usize| mixed.kind.get(voxel(e)).copied().unwrap_or(0);
+    Ok(Graded::of_kinds(mesh, young, &kinds, factor, kind))
+}
+
+fn mesh<T: Sync>(
+    grid: Grid,
+    voxels: &[T],
+    is_bone: impl Fn(&T) -> bool + Sync,
+    params: &SolveParams,
+    keep: Keep,
+) -> Result<VoxelMesh> {
+    match keep {
+        Keep::BetweenGrips => {
+            let grips = Planes::within(&grid, params.axis, params.grip_mm)?;
+            VoxelMesh::new(grid, voxels, is_bone, grips)
+        }
+        Keep::AtFaces => VoxelMesh::at_faces(grid, voxels, is_bone),
+    }
+}
+
+impl Operator<3> for Bricks {
+    fn sites(&self) -> usize {
+        self.mesh().len()
+    }
+
+    fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.apply(x, y),
+            Bricks::Graded(model) => model.apply(x, y),
+        }
+    }
+
+    fn diagonal(&self, d: &mut [[f64; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.diagonal(d),
+            Bricks::Graded(model) => model.diagonal(d),
+        }
+    }
+}
+
+impl Coarsen for Bricks {
+    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.positions(sites, x),
+            Bricks::Graded(model) => model.positions(sites, x),
+        }
+    }
+
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
+        match self {
+            Bricks::Equal(model) => model.each_row(sites, visit),
+            Bricks::Graded(model) => model.each_row(sites, visit),
+        }
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        self.mesh().reach(sites)
+    }
+
+    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.rows_f64(sites, x, y),
+            Bricks::Graded(model) => model.rows_f64(sites, x, y),
+        }
+    }
+
+    fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
+        match self {
+            Bricks::Equal(model) => model.rows_f32(sites, x, y),
+            Bricks::Graded(model) => model.rows_f32(sites, x, y),
+        }
+    }
+
+    fn eigenvalue_bound(&self) -> f64 {
+        match self {
+            Bricks::Equal(model) => model.eigenvalue_bound(),
+            Bricks::Graded(model) => model.eigenvalue_bound(),
+        }
+    }
+}

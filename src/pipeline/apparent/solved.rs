@@ -1,0 +1,141 @@
+//! Owns what a solve yields, and its row of the results table.
+
+use crate::grid::Grid;
+use crate::pipeline::apparent::{Load, SolveParams};
+use crate::result::row::Row;
+use crate::solver::cg::Ended;
+use crate::volume::Specimen;
+
+/// A number with the part of it that the solver left undone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moduli {
+    /// The headline (see [`crate::result::row::Row::e_app_mpa`]).
+    pub e_app_mpa: f64,
+    pub from_energy_mpa: f64,
+    pub from_reaction_mpa: f64,
+    /// Over all sites; for firm over the fully coordinated ones.
+    pub from_stress_mpa: f64,
+    /// Estimated algebraic error of the headline.
+    pub algebraic_error_mpa: f64,
+}
+
+/// A solved model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solved {
+    pub sites: usize,
+    pub dropped: usize,
+    pub unknowns: usize,
+    pub iterations: usize,
+    pub residual: f64,
+    pub ended: Ended,
+    pub moduli: Moduli,
+    /// Where asked for.
+    pub mechanisms: Option<usize>,
+}
+
+impl Solved {
+    /// The result of a structure that does not connect the faces.
+    pub fn disconnected(dropped: usize) -> Self {
+        let zero = Moduli {
+            e_app_mpa: 0.0,
+            from_energy_mpa: 0.0,
+            from_reaction_mpa: 0.0,
+            from_stress_mpa: 0.0,
+            algebraic_error_mpa: 0.0,
+        };
+        Solved {
+            sites: 0,
+            dropped,
+            unknowns: 0,
+            iterations: 0,
+            residual: 0.0,
+            ended: Ended::ResidualTolerance,
+            moduli: zero,
+            mechanisms: None,
+        }
+    }
+
+    /// Whether bone connects the loaded faces.
+    pub fn connected(&self) -> bool {
+        self.sites > 0
+    }
+}
+
+impl SolveParams {
+    /// A row's settings, before any solve. Method, structure and resolution are the caller's to fill in.
+    pub fn row(&self, specimen: &Specimen) -> Row {
+        Row {
+            scan: specimen.name.clone(),
+            voxel_mm: voxel_words(&specimen.bone.grid),
+            young_mpa: self.young_mpa,
+            poisson: self.poisson,
+            load: self.load.name().to_owned(),
+            ends: match self.load {
+                Load::Stiffness => self.conditions.name().to_owned(),
+                Load::Uniaxial | Load::Confined => self.ends.name().to_owned(),
+            },
+            axis: self.axis.name().to_owned(),
+            strain: self.strain,
+            grip_mm: self.grip_mm,
+            tv_definition: specimen.tv_definition.clone(),
+            tv_mm3: specimen.tv_mm3,
+            bv_tv: specimen.bv_tv(),
+            tolerance: Some(self.tolerance),
+            ..Row::default()
+        }
+    }
+}
+
+impl Solved {
+    /// Completes a row of settings with this solve's numbers. The clock and the memory are the caller's to fill in.
+    pub fn row(&self, settings: Row) -> Row {
+        let m = &self.moduli;
+        let count = |n: usize| Some(n as u64);
+        Row {
+            sites: count(self.sites),
+            dropped_sites: count(self.dropped),
+            unknowns: count(self.unknowns),
+            iterations: count(self.iterations),
+            residual: Some(self.residual),
+            converged: Some(self.ended.converged()),
+            e_app_mpa: Some(m.e_app_mpa),
+            e_app_reaction_mpa: Some(m.from_reaction_mpa),
+            e_app_stress_mpa: Some(m.from_stress_mpa),
+            algebraic_error_mpa: Some(m.algebraic_error_mpa).filter(|e| e.is_finite()),
+            mechanisms: self.mechanisms.map(|n| n as u64),
+            note: self.note(),
+            ..settings
+        }
+    }
+
+    /// What a reader must know of this row, in words.
+    fn note(&self) -> Option<String> {
+        match self.ended {
+            _ if !self.connected() => {
+                Some("no path of bone between the loaded faces: E_app is 0".into())
+            }
+            Ended::IterationLimit => Some("not converged: iteration limit reached".into()),
+            Ended::Breakdown => Some("not converged: the model is not positive definite".into()),
+            Ended::Faint => Some(
+                "not converged: so little stiffness is left (below 1e-5 of a solid bar's) that its error cannot be told; \
+                 E_app is an upper bound, a smaller --tolerance brings it nearer"
+                    .into(),
+            ),
+            Ended::Mechanism => Some(
+                "what connects the loaded faces only turns and shifts: E_app is 0 to rounding"
+                    .into(),
+            ),
+            Ended::EnergyTolerance | Ended::ResidualTolerance => None,
+        }
+    }
+}
+
+/// One edge where the voxels are cubes, `x;y;z` otherwise.
+fn voxel_words(grid: &Grid) -> String {
+    let [x, y, z] = grid.spacing_mm;
+    if x == y && y == z {
+        x.to_string()
+    } else {
+        format!("{x};{y};{z}")
+    }
+}

@@ -1,0 +1,260 @@
+//! Owns the lattice stage: from a specimen to the sites of one lattice.
+
+use crate::discretisation::lattice::pieces::Pieces;
+pub use crate::discretisation::lattice::placement::Boundary;
+use crate::discretisation::lattice::placement::{Frame, weigh};
+use crate::discretisation::lattice::sites::{Grips, Sites};
+pub use crate::discretisation::lattice::stencil::Structure;
+use crate::discretisation::lattice::tissue::stiffen;
+use crate::error::{Error, Result};
+use crate::grid::Axis;
+use crate::volume::Specimen;
+use serde::{Deserialize, Serialize};
+
+/// Settings of `lattice`: one lattice per structure × lattice parameter × boundary.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LatticeParams {
+    pub structure: Vec<Structure>,
+    pub lp_mm: Vec<f64>,
+    pub boundary: Vec<Boundary>,
+    /// Offset of the lattice in mm.
+    pub registration_mm: [f64; 3],
+}
+
+impl Default for LatticeParams {
+    fn default() -> Self {
+        LatticeParams {
+            structure: vec![Structure::Sc],
+            lp_mm: vec![0.06, 0.08, 0.10, 0.12],
+            boundary: vec![Boundary::Firm, Boundary::Floppy],
+            registration_mm: [0.0; 3],
+        }
+    }
+}
+
+impl LatticeParams {
+    /// Refuses what no lattice can be built from.
+    pub fn check(&self) -> Result<()> {
+        for (key, empty) in [
+            ("lattice.structure", self.structure.is_empty()),
+            ("lattice.lp_mm", self.lp_mm.is_empty()),
+            ("lattice.boundary", self.boundary.is_empty()),
+        ] {
+            if empty {
+                return Err(Error::setting(key, "an empty list", "name at least one"));
+            }
+        }
+        if let Some(lp) = self.lp_mm.iter().find(|lp| !(lp.is_finite() && **lp > 0.0)) {
+            return Err(Error::setting(
+                "lattice.lp_mm",
+                format!("expected lengths in mm above 0, found {lp}"),
+                "the paper uses 0.06, 0.08, 0.10, 0.12",
+            ));
+        }
+        if self.registration_mm.iter().any(|r| !r.is_finite()) {
+            return Err(Error::setting(
+                "lattice.registration_mm",
+                "expected three finite lengths in mm",
+                "0,0,0 centres the lattice",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// One lattice of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Case {
+    pub structure: Structure,
+    pub lp_mm: f64,
+    pub boundary: Boundary,
+    pub registration_mm: [f64; 3],
+}
+
+impl LatticeParams {
+    /// All lattices asked for: structures, then lattice parameters from coarse to fine, then boundaries, floppy before
+    /// firm.
+    pub fn cases(&self) -> Vec<Case> {
+        let mut lps = self.lp_mm.clone();
+        lps.sort_by(|a, b| b.total_cmp(a));
+        let mut cases = Vec::new();
+        for &structure in &self.structure {
+            for &lp_mm in &lps {
+                for boundary in [Boundary::Floppy, Boundary::Graded, Boundary::Firm] {
+                    if self.boundary.contains(&boundary) {
+                        let registration_mm = self.registration_mm;
+                        cases.push(Case {
+                            structure,
+                            lp_mm,
+                            boundary,
+                            registration_mm,
+                        });
+                    }
+                }
+            }
+        }
+        cases
+    }
+}
+
+impl Case {
+    /// Part of the names of its files: `sc-firm-0.06`.
+    pub fn stem(&self) -> String {
+        let (structure, boundary) = (self.structure.name(), self.boundary.name());
+        format!("{structure}-{boundary}-{}", self.lp_mm)
+    }
+
+    /// Whether its sites are connected pieces of bone: graded SC lattices.
+    pub fn in_pieces(&self) -> bool {
+        self.boundary == Boundary::Graded && self.structure == Structure::Sc
+    }
+}
+
+/// Builds one lattice of a specimen: places sites, joins them, drops what has no path to both grips.
+///
+/// # Errors
+/// A lattice parameter or grip that does not fit the specimen.
+pub fn build(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<Sites> {
+    build_of(specimen, None, case, axis, grip_mm)
+}
+
+/// The same where tissue differs: `tissue` is each voxel's modulus over that of the lattice, not read in pores.
+pub fn build_of(
+    specimen: &Specimen,
+    tissue: Option<&[f32]>,
+    case: &Case,
+    axis: Axis,
+    grip_mm: f64,
+) -> Result<Sites> {
+    let (frame, grips) = lay(specimen, case, axis, grip_mm)?;
+    let weights = weights(specimen, tissue, case, &frame);
+    Ok(Sites::connect(frame, weights, grips))
+}
+
+/// Of every candidate of a frame.
+fn weights(specimen: &Specimen, tissue: Option<&[f32]>, case: &Case, frame: &Frame) -> Vec<f32> {
+    let mut weights = weigh(frame, &specimen.bone, case.boundary);
+    if let Some(tissue) = tissue {
+        stiffen(frame, &specimen.bone, tissue, &mut weights);
+    }
+    weights
+}
+
+/// What each site of a lattice takes of `tissue`, a value per voxel, times its weight: as its springs are made by [`build_of`].
+pub fn values_of(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sites) -> Vec<f64> {
+    let frame = &sites.frame;
+    let weights = weights(specimen, Some(tissue), case, frame);
+    let value = |at: &[i32; 3]| frame.candidate(*at).map_or(0.0, |c| f64::from(weights[c]));
+    sites.indices.iter().map(value).collect()
+}
+
+/// [`build`] for a graded SC lattice: a site for each connected piece of bone in a cell.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_pieces(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<Pieces> {
+    let lp = case.lp_mm;
+    let wrapped = Case {
+        // Shifts by whole cells change nothing, but would leave the bone on one side without cells.
+        registration_mm: case.registration_mm.map(|r| r - lp * (r / lp).round()),
+        ..*case
+    };
+    let (frame, grips) = lay(specimen, &wrapped, axis, grip_mm)?;
+    Ok(Pieces::connect(frame, &specimen.bone, grips))
+}
+
+fn lay(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Frame, Grips)> {
+    let frame = Frame::new(
+        &specimen.bone.grid,
+        case.structure,
+        case.lp_mm,
+        case.boundary,
+        axis,
+        case.registration_mm,
+    )?;
+    let length = specimen.length_mm(axis);
+    let grips = Grips::new(&frame, length, grip_mm).ok_or_else(|| {
+        Error::setting(
+            "grip_mm",
+            format!(
+                "grips of {grip_mm} mm leave nothing free between them: {length:.4} mm long at lp {} mm",
+                case.lp_mm
+            ),
+            "give a thinner grip or a smaller lattice parameter",
+        )
+    })?;
+    Ok((frame, grips))
+}
+
+/// What a lattice is made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LatticeSummary {
+    pub structure: Structure,
+    pub boundary: Boundary,
+    pub lp_mm: f64,
+    pub sites: usize,
+    pub bonds: usize,
+    pub fully_coordinated_sites: usize,
+    /// Sites without a path of bonds to both grips.
+    pub dropped_sites: usize,
+    /// Volume of the sites' cells (graded: their bone) over TV.
+    pub lattice_bv_tv: f64,
+}
+
+pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSummary {
+    let whole = sites
+        .weights
+        .as_ref()
+        .map_or(sites.len() as f64, |w| w.iter().sum());
+    LatticeSummary {
+        structure: case.structure,
+        boundary: case.boundary,
+        lp_mm: case.lp_mm,
+        sites: sites.len(),
+        bonds: sites.bonds(),
+        fully_coordinated_sites: (0..sites.len())
+            .filter(|&s| sites.fully_coordinated(s))
+            .count(),
+        dropped_sites: sites.dropped,
+        lattice_bv_tv: whole * sites.cell_mm3() / specimen.tv_mm3,
+    }
+}
+
+/// [`summarise`] for a lattice of pieces. Fully coordinated are those with a neighbour along every bond.
+pub fn summarise_pieces(specimen: &Specimen, case: &Case, pieces: &Pieces) -> LatticeSummary {
+    let bone: f64 = pieces.fractions.iter().map(|&f| f64::from(f)).sum();
+    let directions = case.structure.stencil().coordination();
+    let whole = |s: &usize| {
+        let mut met = vec![false; directions];
+        pieces.bonds.of(*s).for_each(|(_, b, _)| met[b] = true);
+        met.into_iter().all(|met| met)
+    };
+    LatticeSummary {
+        structure: case.structure,
+        boundary: case.boundary,
+        lp_mm: case.lp_mm,
+        sites: pieces.len(),
+        bonds: pieces.pairs().count(),
+        fully_coordinated_sites: (0..pieces.len()).filter(whole).count(),
+        dropped_sites: pieces.dropped,
+        lattice_bv_tv: bone * case.lp_mm.powi(3) / specimen.tv_mm3,
+    }
+}
+
+impl LatticeSummary {
+    /// One line for a person.
+    pub fn in_words(&self) -> String {
+        format!(
+            "{} {:<7} {:>6} mm  {:>9} sites  {:>10} bonds  {:>9} fully coordinated  {:>6} dropped  lattice BV/TV {:.4}",
+            self.structure.name(),
+            self.boundary.name(),
+            self.lp_mm,
+            self.sites,
+            self.bonds,
+            self.fully_coordinated_sites,
+            self.dropped_sites,
+            self.lattice_bv_tv,
+        )
+    }
+}

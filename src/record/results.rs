@@ -1,0 +1,325 @@
+//! Owns the results of one scan on disk: `results.csv`, one row per solve, and the same with provenance in
+//! `results.json`. Both are written whole after each solve; what is there for the same mask, settings and version is not
+//! redone.
+
+use crate::command::host;
+use crate::command::session::Session;
+use crate::error::{Error, Result};
+use crate::io::{atomic, table};
+use crate::pipeline::apparent::SolveParams;
+use crate::result::extrapolate::with_extrapolated;
+use crate::result::ffb::with_ffb;
+use crate::result::row::Row;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// The rows of a scan, or of a run, for other programs.
+pub const TABLE: &str = "results.csv";
+
+/// Where the rows of an earlier mask, or of a scan that failed since, are set aside; gone with the next solve.
+const OLD_TABLE: &str = "results.old.csv";
+
+/// Renames `results.csv`, whose rows no longer belong to what else is in the folder, so that nothing takes them for
+/// current. True if there was one.
+pub fn set_aside(dir: &Path) -> bool {
+    std::fs::rename(dir.join(TABLE), dir.join(OLD_TABLE)).is_ok()
+}
+
+/// The same where the mask in `dir` is not that of the results.
+pub fn set_aside_stale(dir: &Path, session: &Session) {
+    let (Some(old), Ok(now)) = (Record::read(dir), Provenance::now(dir)) else {
+        return;
+    };
+    let stale = !session.dry_run && old.provenance.mask_blake3 != now.mask_blake3;
+    if stale && set_aside(dir) {
+        session.say(format!(
+            "{}: the mask is another one: the results of the old one are set aside as {OLD_TABLE}",
+            dir.display()
+        ));
+    }
+}
+
+/// Writes `results.csv`; an older one that was set aside goes.
+pub fn write_table(dir: &Path, rows: &[Row]) -> Result<()> {
+    table::write(&dir.join(TABLE), rows)?;
+    let _ = std::fs::remove_file(dir.join(OLD_TABLE));
+    Ok(())
+}
+
+/// The content of `results.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Record {
+    provenance: Provenance,
+    rows: Vec<KeyedRow>,
+}
+
+/// Where results come from, enough to make them again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Provenance {
+    program: String,
+    version: String,
+    /// Of the last solve, in UTC.
+    date: String,
+    host: String,
+    threads: usize,
+    /// BLAKE3 of `mask.nii.gz`: rows of another mask are not these.
+    mask_blake3: String,
+    /// `segment.json` as it was: the input, its hash, the settings.
+    segment: Value,
+}
+
+/// A row; for a solved one with the settings it follows from and their key. Means have neither.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct KeyedRow {
+    #[serde(flatten)]
+    row: Row,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    key: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    settings: Option<SolveParams>,
+}
+
+/// The rows of one scan's folder.
+pub struct Results {
+    dir: PathBuf,
+    record: Record,
+}
+
+impl Results {
+    /// Opens the results in `dir`; empty where there are none, where they belong to another mask or version, or when
+    /// everything is to be redone.
+    ///
+    /// # Errors
+    /// A mask that cannot be read.
+    pub fn open(dir: &Path, redo: bool) -> Result<Self> {
+        let provenance = Provenance::now(dir)?;
+        let old = Record::read(dir);
+        let same = |r: &Record| {
+            r.provenance.mask_blake3 == provenance.mask_blake3
+                && r.provenance.version == provenance.version
+        };
+        let mut rows = old
+            .filter(|r| !redo && same(r))
+            .map_or(Vec::new(), |r| r.rows);
+        // Means are made anew from what was solved.
+        rows.retain(|row| row.key.is_some());
+        Ok(Results {
+            dir: dir.to_path_buf(),
+            record: Record { provenance, rows },
+        })
+    }
+
+    /// The converged row that follows from the same settings, if it was made before. `blank` is the row before its
+    /// solve.
+    pub fn find(&self, blank: &Row, params: &SolveParams) -> Option<Row> {
+        let key = Some(key(blank, params));
+        let same = |old: &&KeyedRow| old.key == key && old.row.converged == Some(true);
+        self.record
+            .rows
+            .iter()
+            .find(same)
+            .map(|old| old.row.clone())
+    }
+
+    /// Keeps a solved row, in place of an older one of the same settings, and writes both files.
+    pub fn keep(&mut self, blank: &Row, params: &SolveParams, row: &Row) -> Result<()> {
+        let mut new = KeyedRow {
+            row: row.clone(),
+            key: Some(key(blank, params)),
+            settings: Some(params.clone()),
+        };
+        if let Some(KeyedRow { row: old, .. }) = self.record.rows.first() {
+            (new.row.group, new.row.subject) = (old.group.clone(), old.subject.clone());
+        }
+        match self.record.rows.iter_mut().find(|old| old.key == new.key) {
+            Some(old) => *old = new,
+            None => self.record.rows.push(new),
+        }
+        self.write()
+    }
+
+    /// Marks all rows, and those to come, with the group and subject that a manifest gives.
+    pub fn label(&mut self, group: &Option<String>, subject: &Option<String>) -> Result<()> {
+        let mut changed = false;
+        for KeyedRow { row, .. } in &mut self.record.rows {
+            if row.group != *group || row.subject != *subject {
+                (row.group, row.subject) = (group.clone(), subject.clone());
+                changed = true;
+            }
+        }
+        if changed { self.write() } else { Ok(()) }
+    }
+
+    /// Lets `change` look at, and change, the note of each solved row.
+    pub fn renote(&mut self, change: impl Fn(&mut Row)) -> Result<()> {
+        let before = self.record.rows.clone();
+        self.record
+            .rows
+            .iter_mut()
+            .for_each(|keyed| change(&mut keyed.row));
+        match self.record.rows == before {
+            true => Ok(()),
+            false => self.write(),
+        }
+    }
+
+    /// Drops what is kept in `dir`.
+    ///
+    /// # Errors
+    /// As [`Results::open`], and files that cannot be written.
+    pub fn begin_anew(dir: &Path) -> Result<()> {
+        Results::open(dir, true)?.write()
+    }
+
+    fn write(&self) -> Result<()> {
+        let solved: Vec<Row> = self
+            .record
+            .rows
+            .iter()
+            .map(|keyed| keyed.row.clone())
+            .collect();
+        let rows = with_extrapolated(&with_ffb(&solved));
+        let mut solved = self.record.rows.iter();
+        let keyed = |row: &Row| match row.boundary.as_deref() {
+            Some("ffb" | "extrapolated") => KeyedRow {
+                row: row.clone(),
+                key: None,
+                settings: None,
+            },
+            _ => solved
+                .next()
+                .expect("means are added, nothing is removed")
+                .clone(),
+        };
+        let record = Record {
+            provenance: self.record.provenance.clone(),
+            rows: rows.iter().map(keyed).collect(),
+        };
+        let text = serde_json::to_string_pretty(&record).expect("plain data");
+        atomic::write(&self.dir.join("results.json"), text)?;
+        write_table(&self.dir, &rows)
+    }
+}
+
+impl Record {
+    /// None where there is none, or an older program wrote another kind.
+    fn read(dir: &Path) -> Option<Self> {
+        let text = std::fs::read(dir.join("results.json")).ok()?;
+        serde_json::from_slice(&text).ok()
+    }
+}
+
+impl Provenance {
+    fn now(dir: &Path) -> Result<Self> {
+        let mask = dir.join("mask.nii.gz");
+        let bytes = std::fs::read(&mask).map_err(|e| {
+            Error::file(
+                &mask,
+                format!("cannot be read: {e}"),
+                "run `bonepd-ct segment` first",
+            )
+        })?;
+        let segment = std::fs::read(dir.join("segment.json")).unwrap_or_default();
+        Ok(Provenance {
+            program: env!("CARGO_PKG_NAME").to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            date: host::date(),
+            host: host::name(),
+            threads: rayon::current_num_threads(),
+            mask_blake3: blake3::hash(&bytes).to_hex().to_string(),
+            segment: serde_json::from_slice(&segment).unwrap_or_default(),
+        })
+    }
+}
+
+/// What a row follows from, beside the mask and the version: its lattice and all settings, also those without a column.
+fn key(blank: &Row, params: &SolveParams) -> String {
+    let all = serde_json::json!([blank, params]);
+    blake3::hash(all.to_string().as_bytes()).to_hex()[..32].to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blank(boundary: &str) -> Row {
+        Row {
+            boundary: Some(boundary.to_owned()),
+            ..Row::default()
+        }
+    }
+
+    fn solved(boundary: &str, e: f64) -> Row {
+        Row {
+            e_app_mpa: Some(e),
+            converged: Some(true),
+            ..blank(boundary)
+        }
+    }
+
+    fn folder() -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("mask.nii.gz"), "mask").unwrap();
+        dir
+    }
+
+    #[test]
+    fn rows_are_found_again_for_the_same_settings_only() {
+        let dir = folder();
+        let params = SolveParams::default();
+        let mut results = Results::open(dir.path(), false).unwrap();
+        results
+            .keep(&blank("firm"), &params, &solved("firm", 1.0 / 3.0))
+            .unwrap();
+        results
+            .keep(&blank("floppy"), &params, &solved("floppy", 0.1))
+            .unwrap();
+
+        let again = Results::open(dir.path(), false).unwrap();
+        assert_eq!(
+            again.find(&blank("firm"), &params),
+            Some(solved("firm", 1.0 / 3.0))
+        );
+        let tighter = SolveParams {
+            tolerance: 1e-6,
+            ..params.clone()
+        };
+        assert_eq!(again.find(&blank("firm"), &tighter), None);
+        let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
+        assert_eq!(table.len(), 3);
+        assert_eq!(table[2].boundary.as_deref(), Some("ffb"));
+
+        assert_eq!(
+            Results::open(dir.path(), true)
+                .unwrap()
+                .find(&blank("firm"), &params),
+            None
+        );
+        std::fs::write(dir.path().join("mask.nii.gz"), "another").unwrap();
+        assert_eq!(
+            Results::open(dir.path(), false)
+                .unwrap()
+                .find(&blank("firm"), &params),
+            None
+        );
+    }
+
+    #[test]
+    fn a_row_that_did_not_converge_is_solved_again_and_replaced() {
+        let dir = folder();
+        let params = SolveParams::default();
+        let mut results = Results::open(dir.path(), false).unwrap();
+        let stalled = Row {
+            converged: Some(false),
+            ..solved("firm", 2.0)
+        };
+        results.keep(&blank("firm"), &params, &stalled).unwrap();
+        assert_eq!(results.find(&blank("firm"), &params), None);
+        results
+            .keep(&blank("firm"), &params, &solved("firm", 1.0))
+            .unwrap();
+        let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
+        assert_eq!(table, [solved("firm", 1.0)]);
+    }
+}

@@ -1,0 +1,123 @@
+//! Owns the segmented scan on disk: `mask.nii.gz` and `segment.json`, written and read back.
+
+use crate::error::{Error, Result};
+use crate::image::{nifti, scan};
+use crate::io::atomic;
+use crate::pipeline::segment::{SegmentParams, SegmentSummary};
+use crate::volume::{Specimen, Volume};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+pub const MASK: &str = "mask.nii.gz";
+pub const RECORD: &str = "segment.json";
+pub const GREY: &str = "grey.nii.gz";
+pub const PICTURE: &str = "segment.png";
+
+/// `segment.json`: what was segmented, how, and what came out; enough to repeat it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SegmentRecord {
+    pub program: String,
+    pub version: String,
+    pub scan: String,
+    pub input: Input,
+    pub settings: SegmentParams,
+    pub results: SegmentSummary,
+}
+
+/// The scan that was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Input {
+    pub path: PathBuf,
+    /// Of the file, or of the names and contents of a folder's slices.
+    pub blake3: String,
+    /// Of the mask that is the volume of interest, where one is.
+    pub voi_blake3: Option<String>,
+    pub format: String,
+    /// Unit of the grey values where the file tells.
+    pub unit: Option<String>,
+    pub notes: Vec<String>,
+}
+
+/// Writes mask and record. The record goes last: where it is, the mask is whole.
+pub fn write(dir: &Path, specimen: &Specimen, record: &SegmentRecord) -> Result<()> {
+    nifti::write(&dir.join(MASK), &specimen.bone)?;
+    match &specimen.grey {
+        Some(grey) => nifti::write(&dir.join(GREY), grey)?,
+        None => drop(std::fs::remove_file(dir.join(GREY))),
+    }
+    let json = serde_json::to_string_pretty(record).expect("records are plain data");
+    atomic::write(&dir.join(RECORD), json + "\n")
+}
+
+/// The record in `dir`; None where there is none or an older program wrote another kind.
+pub fn record(dir: &Path) -> Option<SegmentRecord> {
+    let text = std::fs::read_to_string(dir.join(RECORD)).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+/// The specimen that `segment` left in `dir`.
+pub fn load(dir: &Path) -> Result<Specimen> {
+    let path = dir.join(RECORD);
+    let again = "segment the scan first: bonepd-ct segment SCAN -o DIR --lower VALUE";
+    let text = std::fs::read_to_string(&path)
+        .map_err(|e| Error::file(&path, format!("no segmented scan here ({e})"), again))?;
+    let record: SegmentRecord = serde_json::from_str(&text).map_err(|e| {
+        Error::file(
+            &path,
+            format!("is no record of a segmentation ({e})"),
+            again,
+        )
+    })?;
+    let mask = dir.join(MASK);
+    let stored = scan::read_as_stored(&mask, record.results.spacing_mm)?;
+    if stored.grid.n != record.results.voxels {
+        return Err(Error::file(
+            &mask,
+            format!(
+                "has {:?} voxels where {RECORD} says {:?}",
+                stored.grid.n, record.results.voxels
+            ),
+            again,
+        ));
+    }
+    Ok(Specimen {
+        name: record.scan,
+        bone: mask_of(&stored),
+        tv_mm3: record.results.tv_mm3,
+        tv_definition: record.results.tv_definition,
+        grey: None,
+    })
+}
+
+/// The values of bone voxels that `segment` kept in `dir`; None where it was not asked to.
+pub fn load_grey(dir: &Path, bone: &Volume<u8>) -> Result<Option<Volume<f32>>> {
+    let path = dir.join(GREY);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let grey = scan::read_as_stored(&path, bone.grid.spacing_mm)?;
+    if grey.grid.n != bone.grid.n {
+        return Err(Error::file(
+            &path,
+            format!(
+                "has {:?} voxels where the mask has {:?}",
+                grey.grid.n, bone.grid.n
+            ),
+            "segment the scan again",
+        ));
+    }
+    Ok(Some(grey))
+}
+
+/// A mask from any image: non-zero is inside.
+pub fn read_mask(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Volume<u8>> {
+    Ok(mask_of(&scan::read(path, spacing_mm)?.volume))
+}
+
+fn mask_of(volume: &Volume<f32>) -> Volume<u8> {
+    let voxels = volume.as_slice().iter();
+    let voxels = voxels.map(|&v| u8::from(v != 0.0 && !v.is_nan()));
+    let mut mask = Volume::from_vec(volume.grid, voxels.collect());
+    mask.affine = volume.affine;
+    mask
+}

@@ -1,0 +1,263 @@
+//! Owns the report: rows of solved scans in; tables, figures and notes out, as plain data.
+
+pub mod html;
+pub mod markdown;
+pub mod plot;
+
+mod comparison;
+mod curves;
+pub mod figure;
+mod sample;
+pub mod statistics;
+pub mod table;
+
+use crate::result::row::Row;
+use figure::Figure;
+use serde::{Deserialize, Serialize};
+use statistics::Statistics;
+use table::Line;
+
+/// Settings of `report`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReportParams {
+    pub title: String,
+}
+
+impl Default for ReportParams {
+    fn default() -> Self {
+        ReportParams {
+            title: "Apparent stiffness of trabecular bone".to_owned(),
+        }
+    }
+}
+
+/// What a report says, before it takes a format.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    pub title: String,
+    pub rows: Vec<Row>,
+    /// One line per scan, structure and lattice parameter: the E_app table.
+    pub lines: Vec<Line>,
+    pub statistics: Statistics,
+    pub figures: Vec<Figure>,
+    /// What a reader must know of single rows, and which of them statistics leave out.
+    pub notes: Vec<String>,
+}
+
+/// Tables and figures of `rows`, in their order.
+pub fn report(rows: &[Row], params: &ReportParams) -> Report {
+    let mut figures = curves::convergence(rows);
+    figures.extend(curves::against_bv_tv(rows));
+    figures.extend(curves::wall_time(rows));
+    figures.extend(curves::speed_error(rows));
+    let (samples, left_out) = sample::samples(rows);
+    figures.extend(comparison::figures(&samples));
+    let statistics = statistics::statistics(&samples);
+    let mut notes = notes(rows);
+    notes.extend(left_out);
+    notes.extend(statistics.analysis_of_variance());
+    Report {
+        title: params.title.clone(),
+        rows: rows.to_vec(),
+        lines: table::lines(rows),
+        statistics,
+        figures,
+        notes,
+    }
+}
+
+/// One note per scan and matter, with the rows it is about.
+fn notes(rows: &[Row]) -> Vec<String> {
+    let found: Vec<(&str, String, String)> = rows.iter().filter_map(note).collect();
+    let matters = distinct(found.iter().map(|(scan, words, _)| (*scan, words)));
+    let one = |(scan, words): (&str, &String)| {
+        let about: Vec<&str> = found
+            .iter()
+            .filter(|(s, w, _)| *s == scan && w == words)
+            .map(|(_, _, row)| row.as_str())
+            .collect();
+        format!("{scan}: {words} ({})", about.join(", "))
+    };
+    matters.into_iter().map(one).collect()
+}
+
+/// Scan, what is to be known, which row.
+fn note(row: &Row) -> Option<(&str, String, String)> {
+    let model = Model::of(row)?;
+    let words = match (&row.note, row.converged) {
+        (Some(note), _) => note.clone(),
+        (None, Some(false)) => "not converged".to_owned(),
+        (None, _) => return None,
+    };
+    let structure = row.structure.to_uppercase();
+    Some((
+        &row.scan,
+        words,
+        format!("{structure} {} {} mm", model.name(), row.lp_mm),
+    ))
+}
+
+/// How a modulus was found: the columns of the table and the curves of the figures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+pub enum Model {
+    Floppy,
+    Firm,
+    Ffb,
+    Graded,
+    VoxelFe,
+    /// Limit of graded lattices.
+    GradedLimit,
+    /// Limit of voxel FE.
+    VoxelFeLimit,
+}
+
+impl Model {
+    pub const ALL: [Model; 7] = [
+        Model::Floppy,
+        Model::Firm,
+        Model::Ffb,
+        Model::Graded,
+        Model::VoxelFe,
+        Model::GradedLimit,
+        Model::VoxelFeLimit,
+    ];
+
+    /// None for a row of a kind this report does not know.
+    pub fn of(row: &Row) -> Option<Model> {
+        match row.boundary.as_deref() {
+            Some("floppy") => Some(Model::Floppy),
+            Some("firm") => Some(Model::Firm),
+            Some("ffb") => Some(Model::Ffb),
+            Some("graded") => Some(Model::Graded),
+            Some("extrapolated") if row.method == "voxel-fe" => Some(Model::VoxelFeLimit),
+            Some("extrapolated") => Some(Model::GradedLimit),
+            None if row.method == "voxel-fe" => Some(Model::VoxelFe),
+            _ => None,
+        }
+    }
+
+    /// A value in the limit, without a lattice parameter of its own.
+    pub fn is_limit(self) -> bool {
+        matches!(self, Model::GradedLimit | Model::VoxelFeLimit)
+    }
+
+    pub fn name(self) -> &'static str {
+        [
+            "floppy",
+            "firm",
+            "FFB mean",
+            "graded",
+            "voxel FE",
+            "graded, extrapolated",
+            "voxel FE, extrapolated",
+        ][self as usize]
+    }
+}
+
+/// Values in order of first appearance.
+fn distinct<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut seen = Vec::new();
+    for value in values {
+        if !seen.contains(&value) {
+            seen.push(value);
+        }
+    }
+    seen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(scan: &str, boundary: &str, lp_mm: f64, e: f64) -> Row {
+        Row {
+            scan: scan.to_owned(),
+            method: "lattice".to_owned(),
+            structure: "sc".to_owned(),
+            boundary: Some(boundary.to_owned()),
+            lp_mm,
+            young_mpa: 1000.0,
+            bv_tv: 0.2,
+            e_app_mpa: Some(e),
+            wall_s: Some(1.0),
+            axis: "z".to_owned(),
+            ..Row::default()
+        }
+    }
+
+    #[test]
+    fn a_line_holds_all_boundaries_of_one_lattice_parameter() {
+        let rows = [
+            row("a", "floppy", 0.1, 30.0),
+            row("a", "firm", 0.1, 90.0),
+            row("a", "ffb", 0.1, 60.0),
+            row("a", "floppy", 0.2, 20.0),
+        ];
+        let report = report(&rows, &ReportParams::default());
+        assert_eq!(report.lines.len(), 2);
+        let line = &report.lines[0];
+        assert_eq!(
+            (
+                line.floppy_mpa,
+                line.firm_mpa,
+                line.ffb_mpa,
+                line.graded_mpa
+            ),
+            (Some(30.0), Some(90.0), Some(60.0), None)
+        );
+        assert_eq!(line.ffb_over_tissue, Some(0.06));
+        assert_eq!(line.condition, None);
+    }
+
+    #[test]
+    fn settings_that_differ_are_told_apart() {
+        let sideways = Row {
+            axis: "x".to_owned(),
+            ..row("a", "floppy", 0.1, 12.0)
+        };
+        let lines = table::lines(&[row("a", "floppy", 0.1, 30.0), sideways]);
+        assert_eq!(lines.len(), 2);
+        assert_eq!(lines[1].condition.as_deref(), Some("axis x"));
+    }
+
+    #[test]
+    fn a_row_that_is_not_converged_is_noted() {
+        let stalled = Row {
+            converged: Some(false),
+            ..row("a", "floppy", 0.1, 30.0)
+        };
+        let report = report(&[stalled], &ReportParams::default());
+        assert_eq!(report.notes, ["a: not converged (SC floppy 0.1 mm)"]);
+    }
+
+    #[test]
+    fn figures_come_only_where_there_is_something_to_show() {
+        let stems = |rows: &[Row]| -> Vec<String> {
+            let report = report(rows, &ReportParams::default());
+            report.figures.into_iter().map(|f| f.stem).collect()
+        };
+        let fine = Row {
+            boundary: None,
+            method: "voxel-fe".to_owned(),
+            structure: "hex8".to_owned(),
+            ..row("a", "", 0.02, 50.0)
+        };
+        let coarse = row("a", "floppy", 0.1, 30.0);
+        assert_eq!(stems(&[]), Vec::<String>::new());
+        assert_eq!(
+            stems(std::slice::from_ref(&coarse)),
+            ["convergence-a", "wall-time"]
+        );
+        assert_eq!(
+            stems(&[coarse.clone(), fine, row("b", "floppy", 0.1, 10.0)]),
+            [
+                "convergence-a",
+                "convergence-b",
+                "bv-tv",
+                "wall-time",
+                "speed-error"
+            ]
+        );
+    }
+}

@@ -1,0 +1,214 @@
+//! Owns the report's statistics over scans: which methods are held against which, and the tables of it.
+
+use super::sample::{LEAST_SCANS, Sample};
+use super::{Model, distinct};
+use crate::result::statistics::agreement::{Agreement, agreement};
+use crate::result::statistics::anova::{Anova, repeated_measures};
+use crate::result::statistics::quartiles::{Quartiles, quartiles};
+use crate::result::statistics::regression::{Regression, regression};
+use serde::Serialize;
+
+/// One line of a table of regressions: `y = intercept + slope · x`.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct RegressionLine {
+    pub y: String,
+    pub x: String,
+    #[serde(flatten)]
+    pub fit: Regression,
+}
+
+/// One line of a table of agreements: `method − reference`, in MPa.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct AgreementLine {
+    pub method: String,
+    pub reference: String,
+    #[serde(flatten)]
+    pub found: Agreement,
+}
+
+/// One line of a table of distributions.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct BoxLine {
+    /// `E_app (MPa)` or `E_app / (BV/TV) (MPa)`.
+    pub quantity: String,
+    pub method: String,
+    /// None: all scans.
+    pub group: Option<String>,
+    #[serde(flatten)]
+    pub found: Quartiles,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct Statistics {
+    /// Empty for fewer than three scans.
+    pub regressions: Vec<RegressionLine>,
+    pub agreements: Vec<AgreementLine>,
+    pub boxes: Vec<BoxLine>,
+    /// Between the methods of `anova_between`, repeated over the scans that have them all.
+    pub anova: Option<Anova>,
+    pub anova_between: Vec<String>,
+}
+
+impl Statistics {
+    /// The analysis of variance in a sentence, with the p that does not assume sphericity.
+    pub(super) fn analysis_of_variance(&self) -> Option<String> {
+        let a = self.anova.as_ref()?;
+        Some(format!(
+            "Analysis of variance between {} over {} scans: Greenhouse–Geisser ε = {:.3}, corrected p = {:.3e}",
+            self.anova_between.join("; "),
+            a.specimens,
+            a.epsilon,
+            a.p_greenhouse_geisser
+        ))
+    }
+}
+
+/// A method held against the reference over the scans that have both.
+pub(super) struct Comparison<'a> {
+    pub sample: &'a Sample,
+    pub reference: &'a Sample,
+    pub method_mpa: Vec<f64>,
+    pub reference_mpa: Vec<f64>,
+}
+
+/// The samples of more than half as many scans as the largest has: a method tried on a few scans does not decide for all.
+fn common(samples: &[Sample]) -> impl Iterator<Item = &Sample> {
+    let most = samples.iter().map(|s| s.cases.len()).max().unwrap_or(0);
+    samples.iter().filter(move |s| 2 * s.cases.len() > most)
+}
+
+/// What the others are held against: of voxel FE and the limits the one of the least stated error, else graded, else FFB.
+pub(super) fn reference(samples: &[Sample]) -> Option<&Sample> {
+    let of = |model| common(samples).filter(move |s| s.model == model);
+    // The first of equals is taken.
+    let stated = [Model::VoxelFeLimit, Model::VoxelFe, Model::GradedLimit]
+        .into_iter()
+        .flat_map(of)
+        .min_by(|a, b| a.stated().total_cmp(&b.stated()));
+    stated.or_else(|| of(Model::Graded).chain(of(Model::Ffb)).next())
+}
+
+/// Whether one is, by definition, half of the other: they agree whatever bone does.
+fn is_part_of(part: &Sample, mean: &Sample) -> bool {
+    let parts = [Model::Firm, Model::Floppy];
+    mean.model == Model::Ffb && parts.contains(&part.model) && part.structure == mean.structure
+}
+
+pub(super) fn against_reference(samples: &[Sample]) -> Vec<Comparison<'_>> {
+    let Some(reference) = reference(samples) else {
+        return Vec::new();
+    };
+    let others = samples
+        .iter()
+        .filter(|s| *s != reference && !is_part_of(s, reference));
+    let against = |sample| {
+        let shared = reference.cases.iter().filter_map(|r| {
+            let s = Sample::of(sample, &r.scan)?;
+            Some((s.e_app_mpa, r.e_app_mpa))
+        });
+        let (method_mpa, reference_mpa) = shared.unzip();
+        Comparison {
+            sample,
+            reference,
+            method_mpa,
+            reference_mpa,
+        }
+    };
+    let enough = |c: &Comparison| c.method_mpa.len() >= LEAST_SCANS;
+    others.map(against).filter(enough).collect()
+}
+
+pub fn statistics(samples: &[Sample]) -> Statistics {
+    let on_bv_tv = samples.iter().filter_map(|s| {
+        let bv_tv: Vec<f64> = s.cases.iter().map(|case| case.bv_tv).collect();
+        Some(RegressionLine {
+            y: format!("E_app {} (MPa)", s.method),
+            x: "BV/TV".to_owned(),
+            fit: regression(&bv_tv, &s.e_app_mpa())?,
+        })
+    });
+    let pairs = against_reference(samples);
+    let on_reference = pairs.iter().filter_map(|c| {
+        Some(RegressionLine {
+            y: format!("E_app {} (MPa)", c.sample.method),
+            x: format!("E_app {} (MPa)", c.reference.method),
+            fit: regression(&c.reference_mpa, &c.method_mpa)?,
+        })
+    });
+    let agreements = pairs.iter().filter_map(|c| {
+        Some(AgreementLine {
+            method: c.sample.method.clone(),
+            reference: c.reference.method.clone(),
+            found: agreement(&c.method_mpa, &c.reference_mpa)?,
+        })
+    });
+    let (anova_between, values) = repeated(samples);
+    Statistics {
+        regressions: on_bv_tv.chain(on_reference).collect(),
+        agreements: agreements.collect(),
+        boxes: samples.iter().flat_map(box_lines).collect(),
+        anova: repeated_measures(&values),
+        anova_between,
+    }
+}
+
+/// The methods of an analysis of variance with their moduli of the scans that have them all. FFB is no method beside both
+/// its parts: a level that follows from others makes the covariance of levels singular.
+fn repeated(samples: &[Sample]) -> (Vec<String>, Vec<Vec<f64>>) {
+    let mut levels: Vec<&Sample> = common(samples).collect();
+    let all = levels.clone();
+    levels.retain(|mean| all.iter().filter(|part| is_part_of(part, mean)).count() < 2);
+    let mut scans: Vec<&str> = all.first().map_or(Vec::new(), |s| {
+        s.cases.iter().map(|c| c.scan.as_str()).collect()
+    });
+    scans.retain(|scan| levels.iter().all(|s| s.of(scan).is_some()));
+    if scans.len() < LEAST_SCANS {
+        return (Vec::new(), Vec::new());
+    }
+    let values = |s: &&Sample| {
+        let own = scans.iter().filter_map(|scan| s.of(scan));
+        own.map(|case| case.e_app_mpa).collect()
+    };
+    let names = levels.iter().map(|s| s.method.clone()).collect();
+    (names, levels.iter().map(values).collect())
+}
+
+fn box_lines(sample: &Sample) -> Vec<BoxLine> {
+    let over = |case: &super::sample::Case| case.e_app_mpa / case.bv_tv;
+    let over: Vec<f64> = sample.cases.iter().map(over).collect();
+    let line = |quantity: &str, group: Option<&str>, values: &[f64]| {
+        Some(BoxLine {
+            quantity: quantity.to_owned(),
+            method: sample.method.clone(),
+            group: group.map(str::to_owned),
+            found: quartiles(values)?,
+        })
+    };
+    let mut lines = vec![
+        line("E_app (MPa)", None, &sample.e_app_mpa()),
+        line("E_app / (BV/TV) (MPa)", None, &over),
+    ];
+    for group in groups(sample) {
+        lines.push(line("E_app (MPa)", Some(group), &of_group(sample, group)));
+    }
+    lines.into_iter().flatten().collect()
+}
+
+pub(super) fn groups(sample: &Sample) -> Vec<&String> {
+    distinct(sample.cases.iter().filter_map(|case| case.group.as_ref()))
+}
+
+pub(super) fn of_group(sample: &Sample, group: &str) -> Vec<f64> {
+    let own = sample
+        .cases
+        .iter()
+        .filter(|c| c.group.as_deref() == Some(group));
+    own.map(|case| case.e_app_mpa).collect()
+}
+
+#[cfg(test)]
+#[path = "statistics_tests.rs"]
+mod tests;
+
+#[cfg(test)]
+pub(super) use tests::cases;

@@ -1,0 +1,142 @@
+//! The statistics of small cohorts of made moduli.
+
+use super::*;
+use crate::report::sample::samples;
+use crate::result::row::Row;
+
+pub(in super::super) mod cases {
+    use super::*;
+
+    fn row(scan: usize, boundary: &str, lp_mm: f64) -> Row {
+        let stiff = if boundary == "firm" { 2.0 } else { 1.0 };
+        Row {
+            scan: format!("s{scan}"),
+            structure: "sc".to_owned(),
+            boundary: Some(boundary.to_owned()),
+            lp_mm,
+            bv_tv: 0.1 * scan as f64,
+            e_app_mpa: Some(stiff * (10.0 * scan as f64 + lp_mm)),
+            group: Some(if scan < 3 { "a" } else { "b" }.to_owned()),
+            ..Row::default()
+        }
+    }
+
+    /// Scans s1, s2, … by floppy, firm and FFB, each at two lattice parameters.
+    pub fn cohort(n: usize) -> Vec<Row> {
+        let scans = (1..=n).flat_map(|scan| {
+            ["floppy", "firm", "ffb"]
+                .into_iter()
+                .flat_map(move |b| [row(scan, b, 0.2), row(scan, b, 0.1)])
+        });
+        scans.collect()
+    }
+
+    pub fn scans_of(sample: &Sample) -> Vec<&str> {
+        sample.cases.iter().map(|case| case.scan.as_str()).collect()
+    }
+
+    /// `rows` with the limit of a method for each scan, of this relative stated error.
+    pub fn with_limit(mut rows: Vec<Row>, method: &str, error: f64) -> Vec<Row> {
+        let lattice = method == "lattice";
+        for scan in distinct(rows.iter().map(|row| row.scan.clone())) {
+            let first = rows.iter().find(|row| row.scan == scan).unwrap().clone();
+            let e = 1.3 * first.e_app_mpa.unwrap() + 1e3 * first.bv_tv * first.bv_tv;
+            rows.push(Row {
+                method: method.to_owned(),
+                structure: if lattice { "sc" } else { "hex8" }.to_owned(),
+                boundary: Some("extrapolated".to_owned()),
+                e_app_mpa: Some(e),
+                discretization_error_mpa: Some(error * e),
+                ..first
+            });
+        }
+        rows
+    }
+}
+
+use cases::{cohort, scans_of, with_limit};
+
+fn of(rows: &[Row]) -> Statistics {
+    statistics(&samples(rows).0)
+}
+
+fn pairs(found: &Statistics) -> Vec<(&str, &str)> {
+    let lines = found.agreements.iter();
+    lines
+        .map(|a| (a.method.as_str(), a.reference.as_str()))
+        .collect()
+}
+
+#[test]
+fn no_samples_have_no_statistics() {
+    assert_eq!(statistics(&[]), Statistics::default());
+}
+
+#[test]
+fn a_mean_is_not_held_against_its_own_parts() {
+    let found = of(&cohort(4));
+    assert_eq!(pairs(&found), []);
+    let on = |x: &str| found.regressions.iter().filter(|r| r.x == x).count();
+    assert_eq!((on("BV/TV"), found.regressions.len()), (3, 3));
+}
+
+#[test]
+fn all_are_held_against_an_independent_reference() {
+    let found = of(&with_limit(cohort(4), "voxel-fe", 0.01));
+    let fe = "voxel FE, extrapolated";
+    assert_eq!(
+        pairs(&found),
+        [("floppy", fe), ("firm", fe), ("FFB mean", fe)]
+    );
+    assert_eq!(found.regressions.len(), 7);
+    assert!(found.agreements.iter().all(|a| a.found.n == 4));
+}
+
+#[test]
+fn two_limits_are_two_methods_and_the_one_of_less_error_is_the_reference() {
+    let (graded, fe) = ("graded, extrapolated", "voxel FE, extrapolated");
+    for (of_graded, of_fe, expected) in [(0.05, 0.02, fe), (0.02, 0.05, graded), (0.02, 0.02, fe)] {
+        let rows = with_limit(cohort(4), "lattice", of_graded);
+        let rows = with_limit(rows, "voxel-fe", of_fe);
+        let (samples, _) = samples(&rows);
+        let found = reference(&samples).unwrap();
+        assert_eq!((found.method.as_str(), samples.len()), (expected, 5));
+    }
+}
+
+#[test]
+fn a_reference_of_a_few_scans_does_not_decide_for_all() {
+    let few = with_limit(cohort(3), "voxel-fe", 0.01);
+    let mut rows = cohort(8);
+    rows.extend(few.into_iter().filter(|row| row.method == "voxel-fe"));
+    let (samples, notes) = samples(&rows);
+    assert_eq!(reference(&samples).unwrap().method, "FFB mean");
+    let found = statistics(&samples);
+    assert_eq!(pairs(&found), [("voxel FE, extrapolated", "FFB mean")]);
+    assert_eq!(found.agreements[0].found.n, 3);
+    assert_eq!(found.anova.unwrap().specimens, 8);
+    assert_eq!(scans_of(&samples[3]), ["s1", "s2", "s3"]);
+    assert!(
+        notes[0].contains("s8 (no converged voxel FE, extrapolated)"),
+        "{notes:?}"
+    );
+}
+
+/// Floppy E, firm 2 E, and a mean that follows from them: two methods, not three.
+#[test]
+fn a_mean_beside_its_parts_is_no_level_of_an_analysis_of_variance() {
+    let mut rows = cohort(4);
+    let found = of(&rows);
+    let (anova, floppy) = (found.anova.unwrap(), [10.1, 20.1, 30.1, 40.1]);
+    assert_eq!(found.anova_between, ["floppy", "firm"]);
+    assert_eq!((anova.methods, anova.specimens), (2, 4));
+    // Of two levels p is the paired t test's.
+    let firm = floppy.map(|e| 2.0 * e);
+    let t = agreement(&firm, &floppy).unwrap();
+    assert!((anova.p / t.bias_p - 1.0).abs() < 1e-9, "{anova:?} {t:?}");
+    let said = found.analysis_of_variance().unwrap();
+    assert!(said.contains("floppy; firm over 4 scans"), "{said}");
+    // Beside one part only it is a level of its own.
+    rows.retain(|row| row.boundary.as_deref() != Some("firm"));
+    assert_eq!(of(&rows).anova_between, ["floppy", "FFB mean"]);
+}

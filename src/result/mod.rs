@@ -1,0 +1,6 @@
+//! What rows of results say: the row itself, means and limits of several rows, statistics of many.
+
+pub mod extrapolate;
+pub mod ffb;
+pub mod row;
+pub mod statistics;

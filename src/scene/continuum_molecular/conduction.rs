@@ -1,0 +1,276 @@
+//! Owns conduction of heat and of charge: steady, transient, and through a body whose bonds break.
+
+use super::equilibrium::{Factorised, factorise, right_hand_side, solve};
+use super::path::stranded;
+use super::setup::Setup;
+use super::steady::{loads, scalar, summary};
+use super::{Conduction, Molecular};
+use crate::error::Result;
+use crate::operator::Operator;
+use crate::physics::continuum_molecular::body::Body;
+use crate::scene::conditions::Time;
+use crate::scene::frame::{Field, Frame, Observer, Summary, Values};
+use crate::scene::setting::Setting;
+
+pub const CONDUCTED: [&[&str]; 1] = [&["temperature", "potential"]];
+
+/// Steady or transient conduction.
+pub fn conduct(
+    scene: &Setting,
+    model: &Molecular,
+    conduction: &Conduction,
+    setup: &Setup,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    let (body, k) = setup.conductor(model, conduction)?;
+    match (&scene.time, conduction.capacity) {
+        (Some(time), Some(capacity)) => {
+            let mut transient = Transient::new(scene, model, setup, body, capacity, time.step)?;
+            let start = vec![conduction.initial; setup.points.len()];
+            transient.run(scene, model, setup, &k, start, observer)
+        }
+        _ => {
+            observer.start(&setup.points, 1)?;
+            let t = scene.time.as_ref().map_or(1.0, |time| time.end);
+            let held = setup.held(scene, model, CONDUCTED, t, None)?;
+            let force = loads(scene, model, setup, CONDUCTED, t)?;
+            let (x, unknowns) = solve(&body, &setup.points, &held, &force)?;
+            let frame = conducted(model, conduction, setup, &body, &k, &x, t);
+            observer.frame(&frame)?;
+            let stored = body.bond_values();
+            Ok(summary(setup, unknowns, stored, 1, frame.numbers))
+        }
+    }
+}
+
+/// Numbers and fields of a temperature or potential.
+fn conducted(
+    model: &Molecular,
+    conduction: &Conduction,
+    setup: &Setup,
+    body: &Body<1>,
+    k: &[f64],
+    x: &[[f64; 1]],
+    t: f64,
+) -> Frame {
+    let values: Vec<f64> = x.iter().map(|v| v[0]).collect();
+    let largest = values.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
+    let mut numbers = vec![("largest".to_owned(), largest)];
+    if let Some(field) = model.known.iter().find_map(|known| match &known.field {
+        super::KnownField::Polynomial(terms) => Some(terms),
+        _ => None,
+    }) {
+        let exact = |p: usize| {
+            let x = setup.points.position(p);
+            field
+                .iter()
+                .map(|[a, b, c]| c * x[0].powf(*a) * x[1].powf(*b))
+                .sum::<f64>()
+        };
+        let errors = (0..values.len()).map(|p| (values[p] - exact(p)).abs());
+        // Unlike the largest of two, this keeps what is not a number.
+        let error = errors.fold(0.0_f64, |m, e| if m >= e { m } else { e });
+        numbers.push(("largest_difference_from_known_field".into(), error));
+    }
+    if let Some(probes) = conduction.probes {
+        numbers.push(("potential_drop".into(), drop(setup, probes, &values)));
+    }
+    let fields = vec![
+        scalar("temperature", values.clone()),
+        Field {
+            name: "flux",
+            values: Values::Vector(flux(setup, body, k, &values)),
+        },
+    ];
+    Frame {
+        time: t,
+        numbers,
+        fields,
+    }
+}
+
+/// Difference of potential between two probes.
+pub fn drop(setup: &Setup, probes: [[f64; 2]; 2], values: &[f64]) -> f64 {
+    let at = |x| setup.points.nearest(x).map_or(0.0, |p| values[p]);
+    at(probes[0]) - at(probes[1])
+}
+
+/// Heat flux from the bonds to warmer points only, each counted in full (eq. 170 with its sign).
+pub fn flux(setup: &Setup, body: &Body<1>, k: &[f64], t: &[f64]) -> Vec<[f64; 2]> {
+    let at = |p: usize| {
+        let mut q = [0.0; 2];
+        for (other, kind, factor) in body.row(p).filter(|(other, _, _)| t[*other] > t[p]) {
+            let b = &setup.bonds[kind];
+            let share = factor * k[kind] * (t[other] - t[p]) / b.length_mm * b.volume_mm2;
+            q[0] -= share * b.n[0];
+            q[1] -= share * b.n[1];
+        }
+        q
+    };
+    (0..t.len()).map(at).collect()
+}
+
+/// Transient conduction by the trapezoidal rule: (C/Δt + A/2) ΔT = -A T - A ΔT_held/2 + f. It keeps a jump swinging from
+/// step to step, so each of the first steps is two halves by the implicit Euler rule, which damps it and has the same
+/// matrix, (2C/Δt + A) ΔT = -A T - A ΔT_held + f; the order stays two (R. Rannacher, Numer. Math. 43 (1984) 309-327).
+pub struct Transient {
+    body: Body<1>,
+    factorised: Factorised,
+    step: f64,
+    done: usize,
+}
+
+/// Steps by the implicit Euler rule.
+const DAMPED: usize = 2;
+
+impl Transient {
+    pub fn new(
+        scene: &Setting,
+        model: &Molecular,
+        setup: &Setup,
+        mut body: Body<1>,
+        capacity: f64,
+        step: f64,
+    ) -> Result<Self> {
+        let held = setup.held(scene, model, CONDUCTED, 0.0, None)?;
+        // Half the conductances stand in the matrix of a step; the operator itself keeps them whole.
+        let halved = |b: &crate::physics::continuum_molecular::bond::Blocks<1>| {
+            crate::physics::continuum_molecular::bond::Blocks {
+                own: [[0.5 * b.own[0][0]]],
+                cross: [[0.5 * b.cross[0][0]]],
+            }
+        };
+        let whole = body.blocks.clone();
+        body.blocks = whole.iter().map(halved).collect();
+        let extra = vec![capacity * setup.cell / step; setup.points.len()];
+        let factorised = factorise(&body, &setup.points, &held, &extra, &[])?;
+        body.blocks = whole;
+        Ok(Transient {
+            body,
+            factorised,
+            step,
+            done: 0,
+        })
+    }
+
+    /// One step from `t` to `t + step`, `x` in place.
+    pub fn advance(
+        &mut self,
+        x: &mut [[f64; 1]],
+        before: &[Option<f64>],
+        after: &[Option<f64>],
+        force: &[[f64; 1]],
+    ) {
+        let change = |share: f64| -> Vec<Option<f64>> {
+            let both = before.iter().zip(after);
+            both.map(|(a, b)| b.map(|b| share * (b - a.unwrap_or(0.0))))
+                .collect()
+        };
+        if self.done < DAMPED {
+            let half = change(0.5);
+            self.solve(x, &half, 1.0, force);
+            self.solve(x, &half, 1.0, force);
+        } else {
+            self.solve(x, &change(1.0), 0.5, force);
+        }
+        self.done += 1;
+    }
+
+    /// Adds (C/Δt + A/2)⁻¹ (f - A (T + θ ΔT_held)), times a half for θ = 1.
+    fn solve(
+        &mut self,
+        x: &mut [[f64; 1]],
+        change: &[Option<f64>],
+        theta: f64,
+        force: &[[f64; 1]],
+    ) {
+        let mut r = vec![[0.0]; x.len()];
+        let at: Vec<[f64; 1]> = x
+            .iter()
+            .zip(change)
+            .map(|(x, c)| [x[0] + theta * c.unwrap_or(0.0)])
+            .collect();
+        self.body.apply(&at, &mut r);
+        for (p, r) in r.iter_mut().enumerate() {
+            r[0] = (force.get(p).map_or(0.0, |f| f[0]) - r[0]) * 0.5 / theta;
+        }
+        let mut q = self.factorised.restrict(&r);
+        self.factorised.llt.solve(&mut q);
+        let dx: Vec<[f64; 1]> = self.factorised.expand(&q, change);
+        x.iter_mut().zip(dx).for_each(|(x, d)| x[0] += d[0]);
+    }
+
+    fn run(
+        &mut self,
+        scene: &Setting,
+        model: &Molecular,
+        setup: &Setup,
+        k: &[f64],
+        start: Vec<f64>,
+        observer: &mut dyn Observer,
+    ) -> Result<Summary> {
+        let steps = scene.time.as_ref().map_or(Ok(1), Time::steps)? as usize;
+        observer.start(&setup.points, steps)?;
+        let mut held = setup.held(scene, model, CONDUCTED, 0.0, None)?;
+        let mut x: Vec<[f64; 1]> = start
+            .iter()
+            .zip(&held)
+            .map(|(s, h)| [h.unwrap_or(*s)])
+            .collect();
+        let mut numbers = Vec::new();
+        for step in 1..=steps {
+            let t = self.step * step as f64;
+            let next = setup.held(scene, model, CONDUCTED, t, None)?;
+            let force = loads(scene, model, setup, CONDUCTED, t - 0.5 * self.step)?;
+            self.advance(&mut x, &held, &next, &force);
+            held = next;
+            let values: Vec<f64> = x.iter().map(|v| v[0]).collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            let largest = values.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
+            numbers = vec![("mean".to_owned(), mean), ("largest".into(), largest)];
+            let mut frame = Frame {
+                time: t,
+                numbers: numbers.clone(),
+                fields: Vec::new(),
+            };
+            if step == steps || scene.output.due(t - self.step, t) {
+                frame.fields = vec![
+                    scalar("temperature", values.clone()),
+                    Field {
+                        name: "flux",
+                        values: Values::Vector(flux(setup, &self.body, k, &values)),
+                    },
+                ];
+            }
+            observer.frame(&frame)?;
+        }
+        Ok(summary(
+            setup,
+            self.factorised.reduction.unknowns(),
+            self.body.bond_values(),
+            steps,
+            numbers,
+        ))
+    }
+}
+
+/// The potential at time `t` of a body whose broken bonds no longer conduct, per unit thickness, and the number of its
+/// unknowns. Not a number where a current has no path.
+pub fn potential(
+    scene: &Setting,
+    model: &Molecular,
+    setup: &Setup,
+    body: &Body<1>,
+    broken: &[bool],
+    t: f64,
+) -> Result<(Vec<f64>, usize)> {
+    let held = setup.held(scene, model, CONDUCTED, t, None)?;
+    let force = loads(scene, model, setup, CONDUCTED, t)?;
+    let stranded = stranded(&setup.family, broken, &held, &force);
+    let mut factorised = factorise(body, &setup.points, &held, &[], &[])?;
+    let mut q = right_hand_side(body, &factorised, &held, &force);
+    factorised.llt.solve(&mut q);
+    let x: Vec<[f64; 1]> = factorised.expand(&q, &held);
+    let value = |(x, stranded): (&[f64; 1], bool)| if stranded { f64::NAN } else { x[0] };
+    Ok((x.iter().zip(stranded).map(value).collect(), q.len()))
+}

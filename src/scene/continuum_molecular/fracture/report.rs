@@ -1,0 +1,157 @@
+//! Owns what fracture reports: damage, loads, energies and their balance, the crack's measures.
+
+use super::{Front, Ledger};
+use crate::error::Result;
+use crate::physics::continuum_molecular::body::Body;
+use crate::scene::continuum_molecular::conduction::{drop, potential};
+use crate::scene::continuum_molecular::steady::{displacement, scalar, summary};
+use crate::scene::frame::{Frame, Observer, Summary};
+
+impl<const D: usize> Front<'_, D> {
+    /// d = 1 - Σ over intact bonds/Σ over all (eq. 105).
+    pub fn damage(&self) -> Vec<f64> {
+        let at = |p: usize| {
+            let (mut all, mut gone) = (0.0, 0.0);
+            for slot in self.setup.family.range(p) {
+                let share = self.setup.family.entry(slot).1.share;
+                all += share;
+                gone += if self.broken[slot] { share } else { 0.0 };
+            }
+            if all > 0.0 { gone / all } else { 0.0 }
+        };
+        (0..self.setup.points.len()).map(at).collect()
+    }
+
+    pub fn sound_points(&self) -> usize {
+        self.sound.iter().filter(|s| **s).count()
+    }
+
+    pub fn numbers(&mut self) -> Vec<(String, f64)> {
+        let h = self.model.thickness;
+        let stiffness = self.window.twice_energy(&self.solid.body.blocks);
+        let elastic = 0.5 * stiffness * self.lambda * self.lambda;
+        let Ledger {
+            work,
+            broken,
+            relaxed,
+        } = self.ledger;
+        let balance = if work > 0.0 {
+            (work - elastic - broken - relaxed) / work
+        } else {
+            0.0
+        };
+        self.worst_balance = self.worst_balance.max(balance.abs());
+        let names = [
+            ("load", h * stiffness * self.lambda),
+            ("work", h * work),
+            ("elastic_energy", h * elastic),
+            ("broken_bond_energy", h * broken),
+            ("relaxation_energy", h * relaxed),
+            ("balance_error", balance),
+            ("broken_bonds", self.crack.broken as f64),
+            ("crack_length", self.crack.length),
+        ];
+        names.into_iter().map(|(n, v)| (n.to_owned(), v)).collect()
+    }
+
+    /// Reports the state. At `accepted` loads with the potential, at the `last` one with all fields.
+    pub fn record(
+        &mut self,
+        observer: &mut dyn Observer,
+        accepted: bool,
+        last: bool,
+    ) -> Result<()> {
+        let mut numbers = self.numbers();
+        let mut fields = Vec::new();
+        let due = accepted && (last || self.scene.output.due(self.recorded, self.lambda));
+        let conducting = self.conductor.as_ref().zip(self.model.conduction.as_ref());
+        if let Some((conductor, conduction)) = conducting.filter(|_| accepted) {
+            let (values, unknowns) = potential(
+                self.scene,
+                self.model,
+                self.setup,
+                conductor,
+                &self.broken,
+                self.lambda,
+            )?;
+            self.potential_unknowns = unknowns;
+            if let Some(probes) = conduction.probes {
+                let before = self.potential_drop;
+                self.potential_drop = drop(self.setup, probes, &values);
+                if self.potential_drop.is_nan() && !before.is_nan() {
+                    observer.warn(&format!(
+                        "at a load of {:.6} the crack leaves the current no path: potential_drop is no number from there on",
+                        self.lambda
+                    ));
+                }
+            }
+            if due {
+                fields.push(scalar("potential", values));
+            }
+        }
+        let probed = self.model.conduction.as_ref().and_then(|c| c.probes);
+        if probed.is_some() {
+            numbers.push(("potential_drop".into(), self.potential_drop));
+        }
+        if due {
+            self.look();
+            fields.insert(0, scalar("damage", self.damage()));
+            fields.push(displacement(&self.x, self.lambda));
+        }
+        if accepted {
+            self.recorded = self.lambda;
+        }
+        observer.frame(&Frame {
+            time: self.lambda,
+            numbers,
+            fields,
+        })
+    }
+
+    pub fn summary(&self, steps: usize) -> Summary {
+        let numbers = [
+            ("peak_load", self.peak),
+            ("last_load_parameter", self.lambda),
+            ("broken_bonds", self.crack.broken as f64),
+            ("crack_length", self.crack.length),
+            ("crack_end_x", self.crack.end[0]),
+            ("crack_end_y", self.crack.end[1]),
+            ("mean_direction_deg", self.crack.mean_direction_deg()),
+            ("end_direction_deg", self.crack.end_direction_deg()),
+            (
+                "broken_bond_energy",
+                self.model.thickness * self.ledger.broken,
+            ),
+            (
+                "relaxation_energy",
+                self.model.thickness * self.ledger.relaxed,
+            ),
+            ("work", self.model.thickness * self.ledger.work),
+            ("worst_balance_error", self.worst_balance),
+            ("sound_points", self.sound_points() as f64),
+            ("solves", self.solves as f64),
+            ("solve_iterations", self.iterations as f64),
+            ("windows", self.windows as f64),
+        ];
+        let coupled = self
+            .conductor
+            .is_some()
+            .then_some(self.potential_unknowns as f64);
+        let numbers = numbers
+            .into_iter()
+            .chain(coupled.map(|n| ("potential_unknowns", n)))
+            .map(|(n, v)| (n.to_owned(), v))
+            .collect();
+        let bodies = [
+            Some(self.solid.body.bond_values()),
+            self.conductor.as_ref().map(Body::bond_values),
+        ];
+        let stored = self.broken.len() + bodies.into_iter().flatten().sum::<usize>();
+        let mut summary = summary(self.setup, self.window.unknowns(), stored, steps, numbers);
+        summary.converged = self.unsettled == 0;
+        if self.crack.stopped {
+            summary.stopped = Some("the crack reached the stop region".into());
+        }
+        summary
+    }
+}

@@ -1,0 +1,275 @@
+//! Owns continuum-molecular scenes: which physics a scene has, and which solution that asks for. Lengths in mm, forces
+//! in N, moduli in MPa, or any consistent units.
+
+pub mod check;
+pub mod conduction;
+pub mod crack;
+pub mod equilibrium;
+pub mod fracture;
+pub mod modes;
+mod path;
+pub mod setup;
+pub mod solid;
+pub mod steady;
+pub mod sweep;
+mod tensors;
+mod unused;
+mod warnings;
+pub mod window;
+
+use crate::error::Result;
+use crate::physics::continuum_molecular::tensor::{Plane, PlaneTensor};
+use crate::scene::conditions::Region;
+use crate::scene::frame::{Observer, Summary};
+use crate::scene::setting::{Inputs, Setting};
+use serde::{Deserialize, Serialize};
+
+/// The table `[physics.continuum-molecular]`. A physics that is left out costs nothing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Molecular {
+    #[serde(default)]
+    pub elasticity: Option<Elasticity>,
+    #[serde(default)]
+    pub conduction: Option<Conduction>,
+    #[serde(default)]
+    pub fracture: Option<Fracture>,
+    #[serde(default)]
+    pub vibration: Option<Vibration>,
+    /// Segments `[x0, y0, x1, y1]` that cut the bonds they cross: pre-cracks, slits.
+    #[serde(default)]
+    pub cracks: Vec<[f64; 4]>,
+    /// Regions held at a known field, for boundary layers.
+    #[serde(default)]
+    pub known: Vec<Known>,
+    /// Out-of-plane thickness; loads and energies are in proportion.
+    #[serde(default = "one")]
+    pub thickness: f64,
+    /// The volume method for surfaces: bonds of incomplete families are stiffened by 2 V0/(Vp + Vq).
+    #[serde(default = "yes")]
+    pub correct_surfaces: bool,
+    /// Run once for each of several values of one parameter.
+    #[serde(default)]
+    pub sweep: Option<sweep::Sweep>,
+}
+
+/// Plane elasticity: exactly one of `moduli`, `young` with `poisson`, `tetrachiral`, `from_scan`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub struct Elasticity {
+    /// C1111, C2222, C1122, C1212, C1112, C2212 in the material's axes.
+    pub moduli: Option<[f64; 6]>,
+    pub young: Option<f64>,
+    pub poisson: Option<f64>,
+    pub tetrachiral: Option<TetrachiralParams>,
+    /// A 6 x 6 apparent stiffness cut to a plane.
+    pub from_scan: Option<FromScan>,
+    /// Of `young` and `from_scan`; plane stress where it is left out.
+    pub plane: Option<Plane>,
+    /// Angle of the material's first axis.
+    pub angle_deg: f64,
+    /// Make the stencil store the exact energy of a homogeneous strain.
+    pub calibrated: bool,
+    pub bending: Option<Bending>,
+    pub thermal: Option<Thermal>,
+}
+
+/// The tetrachiral block lattice of eqs. 86-90.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TetrachiralParams {
+    pub block: f64,
+    pub chirality_deg: f64,
+    pub interface: f64,
+    pub young: f64,
+    pub poisson: f64,
+}
+
+/// Where a 6 x 6 stiffness (MPa, Voigt order 11, 22, 33, 23, 13, 12) is read from, and which of its axes span the plane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FromScan {
+    /// JSON file, relative to the scene file: the matrix itself, or an object with it under `stiffness_mpa`.
+    pub file: std::path::PathBuf,
+    /// For instance `[\"x\", \"z\"]`: the scan's axes that become the scene's first and second.
+    pub axes: [crate::grid::Axis; 2],
+}
+
+/// Couple-stress moduli E3131 and E3232 (N), eqs. 177-181 for any even exponent.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bending {
+    pub first: f64,
+    pub second: f64,
+    #[serde(default = "two")]
+    pub exponent: u32,
+}
+
+/// Thermal strain (eq. 176): expansion a11, a22, a12 per degree, temperature rise `[T0, dT/dx, dT/dy]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Thermal {
+    pub expansion: [f64; 3],
+    pub rise: [f64; 3],
+}
+
+/// Heat or electric conduction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Conduction {
+    /// K11, K22, K12 in the material's axes.
+    pub conductivity: [f64; 3],
+    #[serde(default)]
+    pub angle_deg: f64,
+    /// Even exponent of the angular law (eq. 163).
+    #[serde(default = "two")]
+    pub exponent: u32,
+    /// Make the stencil conduct a linear field exactly.
+    #[serde(default)]
+    pub calibrated: bool,
+    /// Heat capacity per volume; with `time`, the scene is transient.
+    #[serde(default)]
+    pub capacity: Option<f64>,
+    #[serde(default)]
+    pub initial: f64,
+    /// Two positions whose potential difference is recorded.
+    #[serde(default)]
+    pub probes: Option<[[f64; 2]; 2]>,
+}
+
+/// Brittle fracture by the energy criterion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fracture {
+    /// Fracture energy (N/mm) of cracks normal to the material's first axis and to its second; with frequency 2 to the
+    /// direction at 45 degrees.
+    pub energy: [f64; 2],
+    #[serde(default = "two")]
+    pub exponent: u32,
+    #[serde(default = "first")]
+    pub frequency: u32,
+    /// Bonds break in extension only.
+    #[serde(default = "yes")]
+    pub extension_only: bool,
+    /// At one load the bonds whose energy ratio is within this share of the largest break together.
+    #[serde(default = "tenth")]
+    pub batch: f64,
+    /// Stop when the crack gets here: when a bond between nearest neighbours, one of them in the region, breaks.
+    #[serde(default)]
+    pub stop: Option<Region>,
+    /// Where a bond never breaks.
+    #[serde(default)]
+    pub unbreakable: Vec<Region>,
+    /// The crack's length is measured from here.
+    #[serde(default)]
+    pub tip: [f64; 2],
+    /// Points of the dense remainder about the crack front.
+    #[serde(default = "window")]
+    pub window_points: usize,
+}
+
+/// Natural vibration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vibration {
+    pub density: f64,
+    pub modes: usize,
+}
+
+/// A region held at a known field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Known {
+    pub region: Region,
+    pub field: KnownField,
+    /// Angle of the direction ahead of the crack, for `crack-tip`: the grid need not lie along the crack.
+    #[serde(default)]
+    pub angle_deg: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum KnownField {
+    /// Displacement and rotation about a crack tip at the origin, the crack behind it along `angle_deg`: K_I and K_II.
+    CrackTip([f64; 2]),
+    /// The affine field of ε11, ε22, 2 ε12, without rotation.
+    Strain([f64; 3]),
+    /// Temperature or potential Σ c xᵃ yᵇ, as rows `[a, b, c]`.
+    Polynomial(Vec<[f64; 3]>),
+}
+
+fn one() -> f64 {
+    1.0
+}
+fn tenth() -> f64 {
+    0.1
+}
+fn yes() -> bool {
+    true
+}
+fn two() -> u32 {
+    2
+}
+fn first() -> u32 {
+    1
+}
+fn window() -> usize {
+    800
+}
+
+/// Runs a continuum-molecular scene.
+///
+/// # Errors
+/// What [`check::check`] refuses, and a body that is not held or not stable.
+pub fn run(
+    scene: &Setting,
+    model: &Molecular,
+    inputs: &Inputs,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    check::check(scene, model, inputs)?;
+    match &model.sweep {
+        Some(sweep) => sweep::run(scene, model, sweep, inputs, observer),
+        None => solve(scene, model, inputs, observer),
+    }
+}
+
+/// Solves a scene that has been checked, for one value of what is swept.
+fn solve(
+    scene: &Setting,
+    model: &Molecular,
+    inputs: &Inputs,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    let setup = setup::Setup::new(scene, model, inputs)?;
+    let warnings = warnings::negative(model, &setup, inputs)?;
+    warnings.iter().for_each(|words| observer.warn(words));
+    let solved = match (&model.elasticity, &model.conduction) {
+        (Some(elasticity), _) => {
+            let tensor = elasticity.tensor(inputs)?;
+            match elasticity.turns(&setup.micromoduli(elasticity, &tensor)?) {
+                true => elastic::<3>(scene, model, elasticity, &tensor, &setup, observer),
+                false => elastic::<2>(scene, model, elasticity, &tensor, &setup, observer),
+            }
+        }
+        (None, Some(conduction)) => conduction::conduct(scene, model, conduction, &setup, observer),
+        (None, None) => unreachable!("refused by the check"),
+    };
+    solved.map_err(|error| warnings::blame(error, &warnings))
+}
+
+fn elastic<const D: usize>(
+    scene: &Setting,
+    model: &Molecular,
+    elasticity: &Elasticity,
+    tensor: &PlaneTensor,
+    setup: &setup::Setup,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    let solid = solid::Solid::<D>::new(scene, model, elasticity, tensor, setup)?;
+    match (&model.vibration, &model.fracture) {
+        (Some(vibration), _) => modes::run(solid, vibration, setup, observer),
+        (None, Some(fracture)) => fracture::run(scene, model, fracture, solid, setup, observer),
+        (None, None) => steady::deform(scene, model, elasticity, tensor, solid, setup, observer),
+    }
+}

@@ -1,0 +1,68 @@
+//! Owns whether currents find a path through a body whose bonds break.
+
+use crate::discretisation::plane::family::Family;
+
+/// Points of pieces, as intact bonds join them, that take up a current and nowhere hold a potential: theirs has no bound.
+/// `held` and `force` are by point, `broken` by listed bond.
+pub fn stranded(
+    family: &Family,
+    broken: &[bool],
+    held: &[Option<f64>],
+    force: &[[f64; 1]],
+) -> Vec<bool> {
+    let mut stranded = vec![false; held.len()];
+    let mut seen = vec![false; held.len()];
+    let largest = force.iter().fold(0.0_f64, |m, f| m.max(f[0].abs()));
+    for start in 0..held.len() {
+        if seen[start] {
+            continue;
+        }
+        seen[start] = true;
+        let mut piece = vec![start];
+        let mut next = 0;
+        while let Some(&p) = piece.get(next) {
+            next += 1;
+            for slot in family.range(p).filter(|&slot| !broken[slot]) {
+                let (q, _) = family.kind(slot);
+                if !std::mem::replace(&mut seen[q], true) {
+                    piece.push(q);
+                }
+            }
+        }
+        let current: f64 = piece.iter().map(|&p| force[p][0]).sum();
+        if piece.iter().all(|&p| held[p].is_none()) && current.abs() > 1e-12 * largest {
+            piece.iter().for_each(|&p| stranded[p] = true);
+        }
+    }
+    stranded
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discretisation::plane::Points;
+    use crate::discretisation::plane::family::Stencil;
+
+    /// Four points in a row, the bond in the middle broken: current into the right half goes nowhere, unless something
+    /// is held there or as much is taken out.
+    #[test]
+    fn a_piece_that_holds_no_potential_strands_its_current() {
+        let points = Points::from_box([0.0; 2], 1.0, [4, 1], |_| true);
+        let family = Family::new(&points, 4, Stencil::new(1.0, 1.01, false).unwrap());
+        let cut = |slot: usize, p: usize| (p < 2) != (family.kind(slot).0 < 2);
+        let broken: Vec<bool> = (0..4)
+            .flat_map(|p| family.range(p).map(move |slot| (slot, p)))
+            .map(|(slot, p)| cut(slot, p))
+            .collect();
+        let intact = vec![false; broken.len()];
+        let held = [Some(0.0), None, None, None];
+        let force = [[0.0], [0.0], [0.0], [1.0]];
+        assert_eq!(stranded(&family, &intact, &held, &force), [false; 4]);
+        let half = [false, false, true, true];
+        assert_eq!(stranded(&family, &broken, &held, &force), half);
+        let both = [Some(0.0), None, Some(1.0), None];
+        assert_eq!(stranded(&family, &broken, &both, &force), [false; 4]);
+        let round = [[0.0], [0.0], [-1.0], [1.0]];
+        assert_eq!(stranded(&family, &broken, &held, &round), [false; 4]);
+    }
+}

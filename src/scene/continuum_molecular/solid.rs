@@ -1,0 +1,137 @@
+//! Owns an elastic body: the moduli of its bonds and what is held of it.
+
+use super::setup::Setup;
+use super::{Bending, Elasticity, Molecular, Thermal};
+use crate::error::Result;
+use crate::physics::continuum_molecular::body::Body;
+use crate::physics::continuum_molecular::bond::{Bond, Deformation, Moduli};
+use crate::physics::continuum_molecular::conductivity::{Conductivity, calibration};
+use crate::physics::continuum_molecular::cosine::CosineLaw;
+use crate::physics::continuum_molecular::micromoduli::Micromoduli;
+use crate::physics::continuum_molecular::tensor::PlaneTensor;
+use crate::scene::setting::Setting;
+
+/// An elastic body and what is held of it at time 1 or at the end.
+pub struct Solid<const D: usize> {
+    pub body: Body<D>,
+    /// Of each bond of the stencil.
+    pub moduli: Vec<Moduli>,
+    pub held: Vec<Option<f64>>,
+    pub thermal: Option<Thermal>,
+}
+
+pub const DISPLACEMENT: [&[&str]; 3] = [&["x"], &["y"], &["rotation"]];
+
+impl Elasticity {
+    /// Whether points turn: without shear and bending micromoduli there is nothing to turn, and two unknowns per point.
+    pub fn turns(&self, micro: &Micromoduli) -> bool {
+        !micro.is_central() || self.bending.is_some()
+    }
+}
+
+impl<const D: usize> Solid<D> {
+    pub fn new(
+        scene: &Setting,
+        model: &Molecular,
+        elasticity: &Elasticity,
+        tensor: &PlaneTensor,
+        setup: &Setup,
+    ) -> Result<Self> {
+        let micro = setup.micromoduli(elasticity, tensor)?;
+        let bending = match &elasticity.bending {
+            Some(b) => bending_moduli(b, elasticity, setup)?,
+            None => vec![0.0; setup.bonds.len()],
+        };
+        let law = |(b, bending): (&Bond, f64)| Moduli {
+            axial: micro.axial(b.psi()),
+            shear: if D == 2 { 0.0 } else { micro.shear(b.psi()) },
+            bending,
+        };
+        let moduli: Vec<Moduli> = setup.bonds.iter().zip(bending).map(law).collect();
+        let blocks = setup
+            .bonds
+            .iter()
+            .zip(&moduli)
+            .map(|(b, k)| b.stiffness(k, setup.cell))
+            .collect();
+        let body = setup.finish(model, Body::new(setup.family.clone(), blocks));
+        let names: [&[&str]; D] = std::array::from_fn(|d| DISPLACEMENT[d]);
+        let t = scene.time.as_ref().map_or(1.0, |time| time.end);
+        let held = setup.held(scene, model, names, t, Some(tensor))?;
+        Ok(Solid {
+            body,
+            moduli,
+            held,
+            thermal: elasticity.thermal,
+        })
+    }
+
+    /// Stretch and shear that bond `b` from `p` to `q` would have if it were free: the thermal strain of the mean
+    /// temperature of its ends.
+    pub fn free_strain(&self, setup: &Setup, p: usize, q: usize, b: &Bond) -> [f64; 2] {
+        let Some(thermal) = &self.thermal else {
+            return [0.0; 2];
+        };
+        let [a11, a22, a12] = thermal.expansion;
+        let [x, y] = b.n;
+        let mean = [p, q].map(|p| thermal.rise_at(setup.points.position(p)));
+        let mean = 0.5 * (mean[0] + mean[1]);
+        [
+            mean * (a11 * x * x + a22 * y * y + 2.0 * a12 * x * y),
+            mean * (a12 * (x * x - y * y) + (a22 - a11) * x * y),
+        ]
+    }
+
+    /// What bond `b` from `p` to `q` carries: its deformation less the thermal one, s - αT (eq. 176).
+    pub fn strained(
+        &self,
+        setup: &Setup,
+        x: &[[f64; D]],
+        p: usize,
+        q: usize,
+        b: &Bond,
+    ) -> Deformation {
+        let mut d = b.deformation(&x[p], &x[q]);
+        let [stretch, shear] = self.free_strain(setup, p, q, b);
+        (d.stretch, d.shear) = (d.stretch - stretch, d.shear - shear);
+        d
+    }
+}
+
+impl Thermal {
+    /// Temperature rise at `x`.
+    pub fn rise_at(&self, x: [f64; 2]) -> f64 {
+        self.rise[0] + self.rise[1] * x[0] + self.rise[2] * x[1]
+    }
+}
+
+/// k_b of each bond: E = (δ³/6) ∫ k_b n nᵀ dψ, of which eqs. 180, 181 are the case n = 2; calibrated,
+/// E = ½ Σ L k_b n nᵀ α Δv for the stencil.
+pub fn bending_moduli(
+    bending: &Bending,
+    elasticity: &Elasticity,
+    setup: &Setup,
+) -> Result<Vec<f64>> {
+    let Bending {
+        first,
+        second,
+        exponent,
+    } = *bending;
+    let zeta = elasticity.angle_deg.to_radians();
+    let scale = 6.0 / setup.horizon().powi(3);
+    let law = CosineLaw::of_second_moment(scale * first, scale * second, exponent, zeta)?;
+    let mut k: Vec<f64> = setup.bonds.iter().map(|b| law.at(b.psi())).collect();
+    if elasticity.calibrated {
+        let conducted: Vec<f64> = k
+            .iter()
+            .zip(&setup.bonds)
+            .map(|(k, b)| k * b.length_mm)
+            .collect();
+        let wanted = Conductivity::principal(first, second, zeta)?;
+        let c = calibration(&setup.bonds, &conducted, wanted.k())?;
+        k.iter_mut()
+            .zip(&setup.bonds)
+            .for_each(|(k, b)| *k *= b.second_harmonic(c));
+    }
+    Ok(k)
+}

@@ -1,0 +1,114 @@
+//! Owns the tensors of a scene in its own axes.
+
+use super::{Conduction, Elasticity, TetrachiralParams};
+use crate::error::{Error, Result};
+use crate::physics::continuum_molecular::conductivity::Conductivity;
+use crate::physics::continuum_molecular::tensor::{Plane, PlaneTensor};
+use crate::physics::continuum_molecular::tetrachiral::Tetrachiral;
+use crate::scene::setting::Inputs;
+
+impl Elasticity {
+    /// The stiffness in the scene's axes.
+    pub fn tensor(&self, inputs: &Inputs) -> Result<PlaneTensor> {
+        let zeta = self.angle_deg.to_radians();
+        let plane = self.plane.unwrap_or_default();
+        let tensor = match (&self.moduli, self.young, &self.tetrachiral, &self.from_scan) {
+            (Some(moduli), None, None, None) => PlaneTensor::from_moduli(*moduli)?,
+            (None, Some(young), None, None) => {
+                let poisson = self.poisson.unwrap_or(0.0);
+                let (below, why) = match plane {
+                    Plane::Strain => (0.5, "an incompressible body has no plane strain"),
+                    Plane::Stress => (1.0, "beyond that the plane is unstable"),
+                };
+                between("elasticity.young", young, 0.0, f64::INFINITY, "")?;
+                between("elasticity.poisson", poisson, -1.0, below, why)?;
+                PlaneTensor::isotropic(young, poisson, plane)?
+            }
+            (None, None, Some(t), None) => t.checked()?.tensor()?,
+            (None, None, None, Some(scan)) => {
+                let six = inputs.stiffness.as_ref().ok_or_else(|| {
+                    Error::setting(
+                        "elasticity.from_scan.file",
+                        "the stiffness was not read",
+                        "check its path",
+                    )
+                })?;
+                PlaneTensor::cut(six, scan.axes.map(|a| a.index()), plane)?
+            }
+            _ => {
+                return Err(Error::setting(
+                    "elasticity",
+                    "expected exactly one of moduli, young (with poisson), tetrachiral, from_scan",
+                    "keep one",
+                ));
+            }
+        };
+        Ok(tensor.turned(zeta))
+    }
+}
+
+impl TetrachiralParams {
+    /// # Errors
+    /// A lattice that cannot be.
+    fn checked(&self) -> Result<Tetrachiral> {
+        for (key, value, low, high) in [
+            ("block", self.block, 0.0, f64::INFINITY),
+            ("interface", self.interface, 0.0, f64::INFINITY),
+            ("young", self.young, 0.0, f64::INFINITY),
+            ("poisson", self.poisson, -1.0, 1.0),
+        ] {
+            between(
+                &format!("elasticity.tetrachiral.{key}"),
+                value,
+                low,
+                high,
+                "",
+            )?;
+        }
+        if !(0.0..45.0).contains(&self.chirality_deg) {
+            return Err(Error::setting(
+                "elasticity.tetrachiral.chirality_deg",
+                format!("found {}", self.chirality_deg),
+                "give an angle from 0 to below 45: there the blocks' interfaces vanish",
+            ));
+        }
+        Ok(Tetrachiral {
+            block_mm: self.block,
+            chirality: self.chirality_deg.to_radians(),
+            interface_mm: self.interface,
+            young_mpa: self.young,
+            poisson: self.poisson,
+        })
+    }
+}
+
+/// # Errors
+/// A value not strictly between `low` and `high`.
+fn between(key: &str, value: f64, low: f64, high: f64, why: &str) -> Result<()> {
+    if low < value && value < high {
+        return Ok(());
+    }
+    let range = match high.is_finite() {
+        true => format!("give a number above {low} and below {high}"),
+        false => format!("give a finite number above {low}"),
+    };
+    let why = if why.is_empty() {
+        String::new()
+    } else {
+        format!(": {why}")
+    };
+    Err(Error::setting(
+        key,
+        format!("found {value}"),
+        format!("{range}{why}"),
+    ))
+}
+
+impl Conduction {
+    /// The conductivity in the scene's axes.
+    pub fn tensor(&self) -> Result<Conductivity> {
+        let [k11, k22, k12] = self.conductivity;
+        let (major, minor, axis) = Conductivity::new(k11, k22, k12)?.axes();
+        Conductivity::principal(major, minor, axis + self.angle_deg.to_radians())
+    }
+}

@@ -1,0 +1,152 @@
+//! Owns scenes: two-dimensional models of points joined by pair potentials (and their local twins), described in one
+//! file. What a scene leaves out costs nothing. This file holds the one match from the physics' words to code.
+
+pub mod conditions;
+pub mod continuum_molecular;
+pub mod frame;
+pub mod pace;
+pub mod remodelling;
+pub mod setting;
+pub mod state;
+
+use crate::discretisation::plane::Points;
+use crate::discretisation::plane::outline::Outline;
+use crate::error::{Error, Result};
+use conditions::{Hold, Layers, Load, Time};
+use continuum_molecular::Molecular;
+use frame::{Observer, Output, Summary};
+use remodelling::bond_based::BondBasedParams;
+use remodelling::continuum::ContinuumParams;
+use remodelling::{bond_based, continuum};
+use serde::{Deserialize, Serialize};
+use setting::{GridParams, Inputs, Probe, Setting};
+use std::path::Path;
+
+/// What a scene file describes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "SceneFile", into = "SceneFile")]
+pub struct Scene {
+    pub setting: Setting,
+    pub physics: Physics,
+}
+
+/// The keys of a scene file, side by side as they stand there.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SceneFile {
+    title: String,
+    geometry: Outline,
+    grid: GridParams,
+    #[serde(default)]
+    layers: Option<Layers>,
+    #[serde(default)]
+    hold: Vec<Hold>,
+    #[serde(default)]
+    load: Vec<Load>,
+    #[serde(default)]
+    time: Option<Time>,
+    physics: Physics,
+    #[serde(default)]
+    probe: Vec<Probe>,
+    #[serde(default)]
+    output: Output,
+}
+
+impl From<SceneFile> for Scene {
+    fn from(file: SceneFile) -> Scene {
+        let setting = Setting {
+            title: file.title,
+            geometry: file.geometry,
+            grid: file.grid,
+            layers: file.layers,
+            hold: file.hold,
+            load: file.load,
+            time: file.time,
+            probe: file.probe,
+            output: file.output,
+        };
+        Scene {
+            setting,
+            physics: file.physics,
+        }
+    }
+}
+
+impl From<Scene> for SceneFile {
+    fn from(scene: Scene) -> SceneFile {
+        let setting = scene.setting;
+        SceneFile {
+            title: setting.title,
+            geometry: setting.geometry,
+            grid: setting.grid,
+            layers: setting.layers,
+            hold: setting.hold,
+            load: setting.load,
+            time: setting.time,
+            probe: setting.probe,
+            output: setting.output,
+            physics: scene.physics,
+        }
+    }
+}
+
+/// The physics of a scene: one table under `[physics]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Physics {
+    /// Peridynamics with harmonic bonds, optionally growing.
+    BondBased(BondBasedParams),
+    /// Its local twin by finite elements.
+    Continuum(ContinuumParams),
+    /// Anisotropic elasticity, fracture, conduction.
+    ContinuumMolecular(Box<Molecular>),
+}
+
+impl Scene {
+    /// `path` only words the errors.
+    pub fn parse(text: &str, path: &Path) -> Result<Scene> {
+        toml::from_str(text).map_err(|e| {
+            let advice = match nearest_key(e.message()) {
+                Some(key) => format!("did you mean `{key}`?"),
+                None => "correct the line shown; `pipelines/` has example scenes".to_owned(),
+            };
+            Error::file(path, format!("not a valid scene\n{e}"), advice)
+        })
+    }
+}
+
+/// Refuses what a run would refuse before its first step. The material points.
+pub fn check(scene: &Scene, inputs: &Inputs) -> Result<Points> {
+    let setting = &scene.setting;
+    setting.output.check()?;
+    match &scene.physics {
+        Physics::BondBased(params) => bond_based::check(setting, params, inputs)?,
+        Physics::Continuum(params) => continuum::check(setting, params, inputs)?,
+        Physics::ContinuumMolecular(model) => {
+            continuum_molecular::check::check(setting, model, inputs)?;
+        }
+    }
+    setting.points(inputs)
+}
+
+/// Runs a scene, reporting states to `observer` as they are accepted.
+pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Result<Summary> {
+    let setting = &scene.setting;
+    setting.output.check()?;
+    match &scene.physics {
+        Physics::BondBased(params) => bond_based::run(setting, params, inputs, observer),
+        Physics::Continuum(params) => continuum::run(setting, params, inputs, observer),
+        Physics::ContinuumMolecular(model) => {
+            continuum_molecular::run(setting, model, inputs, observer)
+        }
+    }
+}
+
+/// The expected key closest to the unknown one that serde names in its message.
+fn nearest_key(message: &str) -> Option<&str> {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let is_unknown = message.starts_with("unknown field") || message.starts_with("unknown variant");
+    let unknown = quoted.next().filter(|_| is_unknown)?;
+    let score = |key: &str| strsim::jaro_winkler(unknown, key);
+    quoted.max_by(|a, b| score(a).total_cmp(&score(b)))
+}

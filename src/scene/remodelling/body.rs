@@ -1,0 +1,263 @@
+//! Owns the set-up that all displacement models of a scene share: which values are unknown, which follow, which are
+//! given at a time, and the guess a step starts from.
+
+mod given;
+
+use crate::discretisation::plane::Points;
+use crate::discretisation::plane::layers::{Edge, Fictitious, add_layers};
+use crate::error::{Error, Result};
+use crate::operator::reduction::{Reduction, Value};
+use crate::scene::conditions::{Hold, Lateral, LayerDensity, Layers};
+
+/// Points with their conditions. Values are densities first (point `p`), then placements (`points + 2p + axis`).
+pub struct Body {
+    /// Material points, then fictitious ones.
+    pub points: Points,
+    pub material: usize,
+    pub map: Reduction,
+    fictitious: Vec<Fictitious>,
+    layers: Option<Layers>,
+    /// Held placements: value, undeformed coordinate, index of the hold.
+    held: Vec<(usize, f64, usize)>,
+    /// Material points on a loaded edge itself: they move with it.
+    on_edge: Vec<(usize, Edge)>,
+    /// Centre and size of the material along each axis.
+    extents: [(f64, f64); 2],
+    holds: Vec<Hold>,
+    /// Initial density of every point.
+    density: Vec<f64>,
+}
+
+/// What a body is made from.
+pub struct Conditions<'a> {
+    pub layers: Option<&'a Layers>,
+    /// Rows of fictitious points where the scene does not say.
+    pub reach: usize,
+    pub holds: &'a [Hold],
+    /// Of the material points.
+    pub density: Vec<f64>,
+    pub reference_density: f64,
+    /// Whether densities are unknowns.
+    pub grows: bool,
+}
+
+impl Body {
+    pub fn new(material: Points, conditions: Conditions) -> Result<Self> {
+        let count = material.len();
+        let (points, fictitious) = match conditions.layers {
+            Some(layers) => {
+                check_layers(layers)?;
+                let depth = layers.depth.unwrap_or(conditions.reach);
+                add_layers(&material, &layers.edges, depth)?
+            }
+            None => (material.clone(), Vec::new()),
+        };
+        let mut density = conditions.density;
+        for f in &fictitious {
+            let fixed = conditions.layers.map(|l| l.density) == Some(LayerDensity::Fixed);
+            density.push(if fixed {
+                conditions.reference_density
+            } else {
+                density[f.mirrored]
+            });
+        }
+        let mut body = Body {
+            material: count,
+            map: Reduction::new(&[]),
+            fictitious,
+            layers: conditions.layers.cloned(),
+            held: Vec::new(),
+            on_edge: Vec::new(),
+            extents: [(0.0, 0.0); 2],
+            holds: conditions.holds.to_vec(),
+            density,
+            points,
+        };
+        body.held = body.find_held(&material)?;
+        body.on_edge = body.edge_rows(material.on_edges);
+        body.extents = [body.extent(0), body.extent(1)];
+        body.map = Reduction::new(&body.roles(conditions.grows));
+        body.require_support()?;
+        Ok(body)
+    }
+
+    /// Regions are of the material: fictitious points, which come after it, are no part of its edges.
+    fn find_held(&self, material: &Points) -> Result<Vec<(usize, f64, usize)>> {
+        let mut held = Vec::new();
+        for (k, hold) in self.holds.iter().enumerate() {
+            let key = format!("hold[{k}].region");
+            hold.value.check(&format!("hold[{k}].value"))?;
+            let axis = axis_of(&hold.component, &format!("hold[{k}].component"))?;
+            for p in hold.region.select(material, material.len(), &key)? {
+                held.push((self.placement(p, axis), self.points.position(p)[axis], k));
+            }
+        }
+        Ok(held)
+    }
+
+    fn edge_rows(&self, on_edges: bool) -> Vec<(usize, Edge)> {
+        let Some(layers) = self.layers.as_ref().filter(|_| on_edges) else {
+            return Vec::new();
+        };
+        let mut rows = Vec::new();
+        for &edge in &layers.edges {
+            let (axis, sign) = edge.normal();
+            let outermost = (0..self.material)
+                .map(|p| sign * self.points.cell(p)[axis])
+                .max();
+            let on = |p: &usize| Some(sign * self.points.cell(*p)[axis]) == outermost;
+            rows.extend((0..self.material).filter(on).map(|p| (p, edge)));
+        }
+        rows
+    }
+
+    fn roles(&self, grows: bool) -> Vec<Value> {
+        let density = if grows { Value::Free } else { Value::Held };
+        let mut roles = vec![density; self.material];
+        roles.resize(self.points.len(), Value::Held);
+        roles.resize(self.points.len() + 2 * self.material, Value::Free);
+        roles.resize(3 * self.points.len(), Value::Held);
+        self.held
+            .iter()
+            .for_each(|&(value, _, _)| roles[value] = Value::Held);
+        let Some(layers) = &self.layers else {
+            return roles;
+        };
+        for &(p, edge) in &self.on_edge {
+            roles[self.placement(p, edge.normal().0)] = Value::Held;
+        }
+        for (k, f) in self.fictitious.iter().enumerate() {
+            let p = self.material + k;
+            let (axis, _) = f.edge.normal();
+            if grows && layers.density == LayerDensity::Mirrored {
+                roles[p] = Value::Follows(f.mirrored);
+            }
+            let leader = self.placement(f.mirrored, 1 - axis);
+            // A held leader's own coordinate is the follower's too: both are given.
+            if layers.lateral == Lateral::Mirrored && roles[leader] == Value::Free {
+                roles[self.placement(p, 1 - axis)] = Value::Follows(leader);
+            }
+        }
+        roles
+    }
+
+    /// Place of a point's coordinate among the values.
+    pub fn placement(&self, point: usize, axis: usize) -> usize {
+        self.points.len() + 2 * point + axis
+    }
+
+    /// Centre and size of the material along an axis.
+    fn extent(&self, axis: usize) -> (f64, f64) {
+        let cells = (0..self.material).map(|p| self.points.cell(p)[axis]);
+        let (low, high) = cells.fold((i32::MAX, i32::MIN), |(l, h), c| (l.min(c), h.max(c)));
+        let rim = if self.on_edge.is_empty() { 1 } else { 0 };
+        let size = (high - low + rim) as f64 * self.points.spacing;
+        let low = low as f64 + 0.5 * (1 - rim) as f64;
+        (
+            self.points.origin[axis] + low * self.points.spacing + 0.5 * size,
+            size,
+        )
+    }
+
+    /// Share of each point's cell inside the body: points on a free edge have half a cell (a quarter at corners). None
+    /// where all cells are whole.
+    pub fn shares(&self) -> Option<Vec<f64>> {
+        if !self.points.on_edges {
+            return None;
+        }
+        let layered = self.layers.as_ref().map(|l| l.edges[0].normal().0);
+        let cells = || (0..self.material).map(|p| self.points.cell(p));
+        let mut share = vec![1.0; self.material];
+        for axis in [0, 1].into_iter().filter(|a| Some(*a) != layered) {
+            let low = cells().map(|c| c[axis]).min();
+            let high = cells().map(|c| c[axis]).max();
+            for (share, cell) in share.iter_mut().zip(cells()) {
+                if Some(cell[axis]) == low || Some(cell[axis]) == high {
+                    *share *= 0.5;
+                }
+            }
+        }
+        share.extend(
+            self.fictitious
+                .iter()
+                .map(|f| share[f.mirrored])
+                .collect::<Vec<_>>(),
+        );
+        Some(share)
+    }
+
+    /// Where each unknown from `first` on, a placement, sits at rest.
+    pub fn unknown_positions(&self, first: usize) -> Vec<[f64; 2]> {
+        let place = |q: usize| self.map.equation(q) - self.points.len();
+        (first..self.map.unknowns())
+            .map(|q| self.points.position(place(q) / 2))
+            .collect()
+    }
+
+    /// Displacement of a point.
+    pub fn displacement(&self, values: &[f64], point: usize) -> [f64; 2] {
+        let rest = self.points.position(point);
+        [0, 1].map(|d| values[self.placement(point, d)] - rest[d])
+    }
+
+    /// Refuses a body that could move or turn as a whole.
+    fn require_support(&self) -> Result<()> {
+        let first = self.points.len();
+        let held = |axis: usize| {
+            (0..self.points.len()).any(|p| self.map.unknown(first + 2 * p + axis).is_none())
+        };
+        let missing = [0, 1].iter().find(|&&axis| !held(axis));
+        let count = (0..2 * first)
+            .filter(|v| self.map.unknown(first + v).is_none())
+            .count();
+        let found = match missing {
+            Some(axis) => format!("nothing holds the body along {}", ["x", "y"][*axis]),
+            None if count < 3 => {
+                "the body can turn: fewer than three displacements are held".to_owned()
+            }
+            None => return Ok(()),
+        };
+        Err(Error::specimen(
+            found,
+            "add a [[hold]] with a region and a component, for instance region = { point = [0, 0] }, component = \"x\"",
+        ))
+    }
+}
+
+fn check_layers(layers: &Layers) -> Result<()> {
+    layers.displacement.check("layers.displacement")?;
+    let axes: Vec<usize> = layers.edges.iter().map(|e| e.normal().0).collect();
+    let twice = layers.edges.len() > 1 && layers.edges[1..].contains(&layers.edges[0]);
+    if axes.is_empty() || axes.iter().any(|&a| a != axes[0]) || axes.len() > 2 || twice {
+        return Err(Error::setting(
+            "layers.edges",
+            "expected one edge or two opposite edges",
+            "give [\"bottom\", \"top\"] or [\"left\", \"right\"]",
+        ));
+    }
+    Ok(())
+}
+
+/// Share of a change of given values by which the response to it is measured.
+pub const NUDGE: f64 = 1e-3;
+
+/// Given values a small share on the way between two states.
+pub fn nudge(from: &[f64], to: &[f64]) -> Vec<f64> {
+    from.iter()
+        .zip(to)
+        .map(|(a, b)| a + NUDGE * (b - a))
+        .collect()
+}
+
+/// How unknowns moved, per unit of time.
+pub fn rate_of(before: &[f64], now: &[f64], dt: f64) -> Vec<f64> {
+    now.iter().zip(before).map(|(b, a)| (b - a) / dt).collect()
+}
+
+/// 0 for "x", 1 for "y".
+pub fn axis_of(component: &str, key: &str) -> Result<usize> {
+    ["x", "y"]
+        .iter()
+        .position(|c| *c == component)
+        .ok_or_else(|| Error::setting(key, format!("found \"{component}\""), "give \"x\" or \"y\""))
+}

@@ -1,0 +1,83 @@
+//! Owns the settings of the local continuum.
+
+use crate::error::{Error, Result};
+use crate::physics::bond_based::micromodulus_discrete;
+use crate::physics::hyperelastic::Energy;
+use crate::scene::remodelling::density::{DensityParams, GrowthParams};
+use crate::scene::remodelling::solver::SolverParams;
+use crate::scene::setting::Setting;
+use serde::{Deserialize, Serialize};
+
+/// `[physics.continuum]`: bilinear quadrilaterals whose nodes are the points of the grid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContinuumParams {
+    /// Young's modulus at the reference density.
+    pub young: f64,
+    /// For St. Venant-Kirchhoff; bonds have 1/3.
+    #[serde(default = "third")]
+    pub poisson: f64,
+    #[serde(default)]
+    pub energy: EnergyLaw,
+    /// Where densities live.
+    #[serde(default)]
+    pub density_at: DensityAt,
+    #[serde(default)]
+    pub density: DensityParams,
+    /// Absent: densities stay.
+    #[serde(default)]
+    pub growth: Option<GrowthParams>,
+    #[serde(default)]
+    pub solver: SolverParams,
+}
+
+fn third() -> f64 {
+    1.0 / 3.0
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum EnergyLaw {
+    #[default]
+    StVenantKirchhoff,
+    /// The local limit of peridynamics: harmonic bonds in all directions.
+    IsotropicBonds,
+    /// The local limit at fixed δ/Δ: harmonic bonds along the grid's stencil.
+    StencilBonds,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum DensityAt {
+    #[default]
+    Nodes,
+    Gauss,
+}
+
+impl ContinuumParams {
+    /// The energy of a strain at the reference density.
+    pub fn law(&self, scene: &Setting) -> Result<Energy> {
+        let usable =
+            self.young > 0.0 && self.young.is_finite() && (-0.99..=0.99).contains(&self.poisson);
+        if !usable {
+            return Err(Error::setting(
+                "physics.continuum.young",
+                format!("found young = {}, poisson = {}", self.young, self.poisson),
+                "give a positive modulus and a plane-stress Poisson's ratio between -0.99 and 0.99",
+            ));
+        }
+        Ok(match self.energy {
+            EnergyLaw::StVenantKirchhoff => Energy::plane_stress(self.young, self.poisson),
+            EnergyLaw::IsotropicBonds => Energy::isotropic_bonds(self.young),
+            EnergyLaw::StencilBonds => {
+                let stencil = scene.stencil()?;
+                let quarter =
+                    0.25 * micromodulus_discrete(self.young, &stencil) * stencil.spacing.powi(2);
+                let bond = |b: &crate::discretisation::plane::family::Bond| {
+                    (b.xi.map(|v| v / b.length), quarter * b.length * b.share)
+                };
+                Energy::Bonds(stencil.bonds.iter().map(bond).collect())
+            }
+        })
+    }
+}

@@ -1,0 +1,10 @@
+//! Scenes that remodel: bond-based peridynamics with or without growth, and its local twin by finite elements.
+
+mod body;
+pub mod bond_based;
+pub mod continuum;
+pub mod density;
+mod loads;
+mod march;
+pub mod solver;
+mod stride;

@@ -1,0 +1,224 @@
+//! Owns the coarse matrix `PᵀAP` of a smoothed prolongator `P = (I − ω D⁻¹A) P₀`.
+//!
+//! Made part by part of the sites: a sweep over a part makes rows of `P` ahead of itself and drops them behind, and rows
+//! of `AP` one at a time. Six columns are kept in eight lanes.
+
+use super::blocks::{self, Block6, BlockMatrix};
+use super::fine::Body;
+use super::level::{Level, Modes};
+use super::rigid::{self, Mat6};
+use super::window::{BLOCK, Entry, Prolongator, Rows, add_product, find};
+use crate::simd;
+use crate::simd::{Isa, Lanes};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A coarse block in the making, row by row of eight lanes.
+type Wide = [[f32; 8]; 6];
+
+/// Blocks of a part of the coarse matrix, upper triangle (column >= row).
+struct Part {
+    places: Vec<(u32, u32)>,
+    blocks: Vec<Block6>,
+}
+
+/// `PᵀAP` with six unknowns per aggregate, in the basis of [`Level::each_modes`], or in that of `bodies` if given.
+pub fn product<const D: usize>(
+    level: &impl Level<D>,
+    omega: f32,
+    bodies: Option<&[Body]>,
+) -> BlockMatrix {
+    let per = level.sites().div_ceil(PARTS).max(2 * BLOCK);
+    let parts: Vec<Part> = (0..level.sites().div_ceil(per))
+        .into_par_iter()
+        .map(|c| part(level, omega, c * per..((c + 1) * per).min(level.sites())))
+        .collect();
+    merge(parts, bodies)
+}
+
+/// Parts of the sites: enough for many threads, few enough that little is made twice at their borders.
+const PARTS: usize = 16;
+
+/// From the plain motions of the aggregates to their orthonormal ones.
+fn in_basis(block: &Block6, row: &Body, column: &Body) -> Block6 {
+    let a: Mat6 = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(block[6 * c + r])));
+    let right = rigid::multiply(&a, &column.basis.basis);
+    let left = &row.basis.basis;
+    std::array::from_fn(|k| {
+        let (r, c) = (k % 6, k / 6);
+        (0..6).map(|m| left[m][r] * right[m][c]).sum::<f64>() as f32
+    })
+}
+
+fn part<const D: usize>(level: &impl Level<D>, omega: f32, sites: Range<usize>) -> Part {
+    match simd::isa() {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the processor has what the function asks for.
+        Isa::Avx512 | Isa::Avx2 => unsafe { part_avx2(level, omega, sites) },
+        // SAFETY: plain arrays ask for nothing.
+        _ => unsafe { part_lanes::<simd::PlainF32, D>(level, omega, sites) },
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn part_avx2<const D: usize>(level: &impl Level<D>, omega: f32, sites: Range<usize>) -> Part {
+    // SAFETY: this function has the features that the lanes ask for.
+    unsafe { part_lanes::<simd::Avx2F32, D>(level, omega, sites) }
+}
+
+/// # Safety
+/// The instruction set of `N` is there.
+#[inline(always)]
+unsafe fn part_lanes<N: Lanes<S = f32>, const D: usize>(
+    level: &impl Level<D>,
+    omega: f32,
+    sites: Range<usize>,
+) -> Part {
+    let spans = sites.clone().step_by(BLOCK);
+    let spans: Vec<Range<usize>> = spans.map(|s| s..(s + BLOCK).min(sites.end)).collect();
+    // What a span of sites reaches, with everything that later ones reach: the sweep never turns back.
+    let mut reaches: Vec<Range<usize>> = spans.iter().map(|s| level.reach(s.clone())).collect();
+    for i in (1..reaches.len()).rev() {
+        reaches[i - 1].start = reaches[i - 1].start.min(reaches[i].start);
+    }
+    let mut prolongator = Prolongator::new(level, omega);
+    let mut sum = Sum::new(level.aggregates().count);
+    let (mut rows, mut image) = (Rows::new(), Vec::<Entry<D>>::new());
+    for (span, reach) in spans.into_iter().zip(reaches) {
+        // SAFETY: the caller's.
+        unsafe { prolongator.cover::<N>(reach) };
+        rows.read(level, span.clone());
+        for (k, i) in span.enumerate() {
+            let own = prolongator.row(i);
+            if own.is_empty() {
+                continue;
+            }
+            image.clear();
+            for (j, block) in rows.row(k) {
+                for entry in prolongator.row(j as usize) {
+                    let slot = find(&mut image, 0, entry.aggregate);
+                    // SAFETY: the caller's.
+                    unsafe { add_product::<N, D>(&mut slot.block, block, &entry.block) };
+                }
+            }
+            for left in own {
+                for right in image.iter().filter(|r| r.aggregate >= left.aggregate) {
+                    let slot = sum.slot(left.aggregate, right.aggregate);
+                    // SAFETY: the caller's.
+                    unsafe { add_transposed::<N, D>(slot, &left.block, &right.block) };
+                }
+            }
+        }
+    }
+    Part {
+        places: sum.places,
+        blocks: sum.blocks.iter().map(packed).collect(),
+    }
+}
+
+/// Column by column, the two idle lanes left out.
+fn packed(wide: &Wide) -> Block6 {
+    std::array::from_fn(|i| wide[i % 6][i / 6])
+}
+
+/// `sum += aᵀ b`.
+///
+/// # Safety
+/// The instruction set of `N` is there.
+#[inline(always)]
+unsafe fn add_transposed<N: Lanes<S = f32>, const D: usize>(
+    sum: &mut Wide,
+    a: &Modes<D>,
+    b: &Modes<D>,
+) {
+    unsafe {
+        let b: [N; D] = std::array::from_fn(|k| N::load(b[k].as_ptr()));
+        for r in 0..6 {
+            let mut lanes = N::load(sum[r].as_ptr());
+            for k in 0..D {
+                lanes = lanes.fma(N::splat(a[k][r]), b[k]);
+            }
+            lanes.store(sum[r].as_mut_ptr());
+        }
+    }
+}
+
+/// Coarse blocks of one part. Rows are few and short, so a block is found by its row's list.
+struct Sum {
+    places: Vec<(u32, u32)>,
+    blocks: Vec<Wide>,
+    /// Per aggregate, one more than the number of its list; 0 where it has none yet.
+    list: Vec<u32>,
+    /// Columns of a row and where their blocks are.
+    lists: Vec<Vec<(u32, u32)>>,
+}
+
+impl Sum {
+    fn new(aggregates: usize) -> Self {
+        Sum {
+            places: Vec::new(),
+            blocks: Vec::new(),
+            list: vec![0; aggregates],
+            lists: Vec::new(),
+        }
+    }
+
+    #[inline(always)]
+    fn slot(&mut self, row: u32, column: u32) -> &mut Wide {
+        let list = &mut self.list[row as usize];
+        if *list == 0 {
+            self.lists.push(Vec::with_capacity(16));
+            *list = self.lists.len() as u32;
+        }
+        let list = &mut self.lists[*list as usize - 1];
+        let at = match list.iter().find(|c| c.0 == column) {
+            Some(c) => c.1 as usize,
+            None => {
+                list.push((column, self.blocks.len() as u32));
+                self.places.push((row, column));
+                self.blocks.push([[0.0; 8]; 6]);
+                self.blocks.len() - 1
+            }
+        };
+        &mut self.blocks[at]
+    }
+}
+
+/// Adds up the parts in their order, changes the basis and makes the diagonal blocks even.
+fn merge(parts: Vec<Part>, bodies: Option<&[Body]>) -> BlockMatrix {
+    let mut index: Vec<(u32, u32, u32, u32)> =
+        Vec::with_capacity(parts.iter().map(|p| p.places.len()).sum());
+    for (p, part) in parts.iter().enumerate() {
+        let places = part.places.iter().enumerate();
+        index.extend(places.map(|(k, &(row, column))| (row, column, p as u32, k as u32)));
+    }
+    index.par_sort_unstable();
+    let same: Vec<&[(u32, u32, u32, u32)]> =
+        index.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).collect();
+    let places: Vec<(u32, u32)> = same.iter().map(|s| (s[0].0, s[0].1)).collect();
+    let block = |at: &&[(u32, u32, u32, u32)]| {
+        let mut sum = [0f32; 36];
+        for &(_, _, p, k) in *at {
+            let part = &parts[p as usize].blocks[k as usize];
+            sum.iter_mut().zip(part).for_each(|(s, p)| *s += p);
+        }
+        finished(sum, at[0].0, at[0].1, bodies)
+    };
+    let mut blocks = Vec::with_capacity(same.len() + 1);
+    same.par_iter().map(block).collect_into_vec(&mut blocks);
+    drop(parts);
+    BlockMatrix::from_upper(&places, blocks)
+}
+
+/// A block column by column, in the basis of `bodies`, even on the diagonal.
+fn finished(mut block: Block6, row: u32, column: u32, bodies: Option<&[Body]>) -> Block6 {
+    if let Some(bodies) = bodies {
+        block = in_basis(&block, &bodies[row as usize], &bodies[column as usize]);
+    }
+    if row == column {
+        let mirrored = blocks::mirrored(&block);
+        block = std::array::from_fn(|i| 0.5 * (block[i] + mirrored[i]));
+    }
+    block
+}

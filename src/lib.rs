@@ -14,7 +14,7 @@
 //! | 6 | [`physics`] and [`solver`] | energies and forces; algorithms. Neither imports the other |
 //! | 7 | [`measure`] and [`result`] | numbers of a mask or a field; what rows of results say together |
 //! | 8 | [`pipeline`], [`scene`] and [`report`] | steps from grey values to an apparent modulus; two-dimensional scenes; rows to tables, figures and pages. None imports another |
-//! | 9 | [`recipe`], [`draw`] | all steps' settings in one file; pictures of masks and of plane fields |
+//! | 9 | [`recipe`], [`draw`], [`machine`] | all steps' settings in one file; pictures of masks and of plane fields; the terminal, the clock and the memory |
 //! | 10 | [`record`], [`export`] | results kept on disk; models and fields for other programs |
 //! | 11 | [`command`] | one verb of the program each: paths and settings in, files out |
 //! | 12 | [`cohort`] | one recipe over many scans, each on its own |
@@ -28,6 +28,7 @@ pub mod export;
 pub mod grid;
 pub mod image;
 pub mod io;
+pub mod machine;
 pub mod mask;
 pub mod measure;
 pub mod operator;

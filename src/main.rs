@@ -6,7 +6,7 @@ use bonepd_ct::command::Outcome;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    bonepd_ct::command::host::give_freed_memory_back();
+    bonepd_ct::machine::host::give_freed_memory_back();
     match cli::run() {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::NotConverged) => {

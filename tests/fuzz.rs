@@ -12,10 +12,10 @@ mod samples;
 
 use bonepd_ct::cohort::scans;
 use bonepd_ct::cohort::scans::Selection;
-use bonepd_ct::command::session::Session;
 use bonepd_ct::command::{estimate, info};
 use bonepd_ct::image::{extent, scan};
 use bonepd_ct::io::table;
+use bonepd_ct::machine::session::Session;
 use bonepd_ct::recipe::Recipe;
 use bonepd_ct::result::row::Row;
 use damage::{damaged, faults};

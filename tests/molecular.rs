@@ -381,12 +381,12 @@ fn transient_heat_follows_its_series() {
     let Physics::ContinuumMolecular(model) = &scene.physics else {
         panic!("a continuum-molecular scene")
     };
-    let setup = Setup::new(&scene, model, &Inputs::default()).unwrap();
+    let setup = Setup::new(&scene.setting, model, &Inputs::default()).unwrap();
     let (body, _) = setup
         .conductor(model, model.conduction.as_ref().unwrap())
         .unwrap();
     let step = 2e-3;
-    let mut transient = Transient::new(&scene, model, &setup, body, 4.0, step).unwrap();
+    let mut transient = Transient::new(&scene.setting, model, &setup, body, 4.0, step).unwrap();
     let pi = std::f64::consts::PI;
     // Two terms of the series of an insulated bar of length 1, x from its left end; D = K/C = 0.5.
     let series = |x: f64, t: f64| {
@@ -699,7 +699,7 @@ fn a_scanned_stiffness_is_cut_to_the_scenes_plane() {
 #[test]
 fn a_scene_file_reads_its_stiffness_from_a_file() {
     use bonepd_ct::command::scene::scene;
-    use bonepd_ct::command::session::Session;
+    use bonepd_ct::machine::session::Session;
     let folder = tempfile::tempdir().unwrap();
     let quiet = Session {
         quiet: true,

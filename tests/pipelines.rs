@@ -226,8 +226,8 @@ fn the_papers_recipe_names_every_key_with_its_default() {
 #[test]
 fn the_papers_window_is_of_hu_in_every_format() {
     use bonepd_ct::command::segment::in_memory;
-    use bonepd_ct::command::session::Session;
     use bonepd_ct::image::scan;
+    use bonepd_ct::machine::session::Session;
     let recipe = Recipe::read(&at_root("pipelines/paper.toml")).unwrap();
     let nifti = at_root("sample_data/trabecular.nii.gz");
     let volume = scan::read(&nifti, None).unwrap().volume;

@@ -1,13 +1,13 @@
 //! `lattice`: sites and bonds over the bone.
 
-use super::solve::TissueSettings;
-use super::{print_json, words};
+use super::print_json;
+use super::settings::{LatticeSettings, TissueSettings};
 use bonepd_ct::command::Outcome;
 use bonepd_ct::command::lattice::{Export, Exports};
-use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
+use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::apparent::SolveParams;
-use bonepd_ct::pipeline::lattice::{Boundary, LatticeParams, Structure};
+use bonepd_ct::pipeline::lattice::LatticeParams;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -30,40 +30,6 @@ pub struct LatticeArgs {
     bins: u16,
     #[command(flatten, next_help_heading = "Tissue of exported lattices (lammps)")]
     tissue: TissueSettings,
-}
-
-#[derive(Args)]
-#[command(next_help_heading = "Lattice")]
-pub struct LatticeSettings {
-    /// Lattice structures, comma-separated [default: sc]
-    #[arg(long, value_delimiter = ',', value_parser = words::choice::<Structure>(&["sc", "bcc", "fcc"]))]
-    structure: Vec<Structure>,
-    /// Lattice parameters in mm, comma-separated [default: 0.06,0.08,0.10,0.12]
-    #[arg(long, value_name = "MM", value_delimiter = ',', value_parser = words::positive)]
-    lp: Vec<f64>,
-    /// How the lattice meets the bone's surface, comma-separated [default: firm,floppy]
-    #[arg(long, value_delimiter = ',', value_parser = words::choice::<Boundary>(&["firm", "floppy", "graded"]))]
-    boundary: Vec<Boundary>,
-    /// Shift the lattice by this many mm along x, y, z
-    #[arg(long, value_name = "X,Y,Z", value_parser = words::triple, allow_hyphen_values = true)]
-    registration: Option<[f64; 3]>,
-}
-
-impl LatticeSettings {
-    /// What was said here wins over `params`.
-    pub fn apply(&self, params: &mut LatticeParams) -> Result<()> {
-        if !self.structure.is_empty() {
-            params.structure = self.structure.clone();
-        }
-        if !self.lp.is_empty() {
-            params.lp_mm = self.lp.clone();
-        }
-        if !self.boundary.is_empty() {
-            params.boundary = self.boundary.clone();
-        }
-        params.registration_mm = self.registration.unwrap_or(params.registration_mm);
-        params.check()
-    }
 }
 
 pub fn run(args: &LatticeArgs, session: &Session, json: bool) -> Result<Outcome> {

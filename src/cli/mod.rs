@@ -8,12 +8,13 @@ mod report;
 mod run;
 mod scene;
 mod segment;
+mod settings;
 mod solve;
 mod words;
 
 use bonepd_ct::command::Outcome;
-use bonepd_ct::command::session::Session;
 use bonepd_ct::error::{Error, Result};
+use bonepd_ct::machine::session::Session;
 use clap::{Args, Parser, Subcommand};
 use serde::Serialize;
 

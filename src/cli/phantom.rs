@@ -2,8 +2,8 @@
 
 use super::{print_json, words};
 use bonepd_ct::command::Outcome;
-use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
+use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::phantom::PhantomParams;
 use clap::Args;
 use std::path::PathBuf;

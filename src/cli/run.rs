@@ -1,14 +1,14 @@
 //! `run`: a recipe on scans.
 
-use super::lattice::LatticeSettings;
 use super::segment::SegmentSettings;
+use super::settings::LatticeSettings;
 use super::solve::SolveSettings;
 use super::{print_json, words};
 use bonepd_ct::cohort::scans::Selection;
 use bonepd_ct::cohort::{Resources, cohort};
 use bonepd_ct::command::Outcome;
-use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
+use bonepd_ct::machine::session::Session;
 use bonepd_ct::recipe::Recipe;
 use clap::Args;
 use glob::Pattern;

@@ -2,8 +2,8 @@
 
 use super::print_json;
 use bonepd_ct::command::Outcome;
-use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
+use bonepd_ct::machine::session::Session;
 use clap::Args;
 use std::path::PathBuf;
 

@@ -2,10 +2,11 @@
 
 use super::{print_json, words};
 use bonepd_ct::command::Outcome;
-use bonepd_ct::command::session::Session;
 use bonepd_ct::error::Result;
 use bonepd_ct::grid::Axis;
-use bonepd_ct::pipeline::segment::{Align, AlignBox, GreyUnit, SegmentParams, Voi};
+use bonepd_ct::image::calibration::GreyUnit;
+use bonepd_ct::machine::session::Session;
+use bonepd_ct::pipeline::segment::{Align, AlignBox, SegmentParams, Voi};
 use clap::Args;
 use std::path::PathBuf;
 

@@ -1,12 +1,11 @@
 //! `solve`: the apparent modulus.
 
-use super::lattice::LatticeSettings;
+use super::settings::{LatticeSettings, TissueSettings};
 use super::{print_json, words};
 use bonepd_ct::command::Outcome;
-use bonepd_ct::command::session::Session;
-use bonepd_ct::error::{Error, Result};
+use bonepd_ct::error::Result;
 use bonepd_ct::grid::Axis;
-use bonepd_ct::physics::material::{Law, Material};
+use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::{Conditions, Ends, Load, Method, SolveParams};
 use clap::Args;
@@ -34,50 +33,6 @@ pub struct SolveArgs {
     /// Of an exported model: different moduli at most; more are rounded to the means of as many bins
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
     bins: u16,
-}
-
-/// What bone is made of.
-#[derive(Args)]
-pub struct TissueSettings {
-    /// Young's modulus of the bone tissue in MPa [default: 1000]
-    #[arg(long, value_name = "E", value_parser = words::positive)]
-    young_mpa: Option<f64>,
-    /// Moduli that differ from voxel to voxel: labels:100=6829/0.3,127=10000 (E, and ν if another), power:C,N (E = C·ρ^N),
-    /// linear:A,B (E = A·ρ + B), homminga:FULL[,N] (E = young-mpa·(ρ/FULL)^N, N 1.7); ρ are the scan's values. Needs
-    /// `segment --keep-grey` or `--labels`
-    #[arg(long, value_name = "LAW", value_parser = words::material)]
-    material: Option<Law>,
-    /// Density of the law is SLOPE·value + INTERCEPT [default: the scan's values]
-    #[arg(long, value_name = "SLOPE,INTERCEPT", value_parser = words::pair, allow_hyphen_values = true)]
-    density: Option<[f64; 2]>,
-    /// Raise smaller moduli of a law to this
-    #[arg(long, value_name = "E", value_parser = words::positive)]
-    least_mpa: Option<f64>,
-}
-
-impl TissueSettings {
-    /// What was said here wins over `params`.
-    pub fn apply(&self, params: &mut SolveParams) -> Result<()> {
-        params.young_mpa = self.young_mpa.unwrap_or(params.young_mpa);
-        if let Some(law) = &self.material {
-            params.material = Some(Material::new(law.clone()));
-        }
-        match &mut params.material {
-            Some(material) => {
-                material.density = self.density.unwrap_or(material.density);
-                material.least_mpa = self.least_mpa.or(material.least_mpa);
-            }
-            None if self.density.is_some() || self.least_mpa.is_some() => {
-                return Err(Error::setting(
-                    "--density, --least-mpa",
-                    "they belong to a law of moduli, and none is given",
-                    "add --material, or leave them out",
-                ));
-            }
-            None => {}
-        }
-        Ok(())
-    }
 }
 
 #[derive(Args)]

@@ -1,7 +1,7 @@
 //! Owns manifests: a CSV with one line per scan, its path and what is special about it. Cells are divided by commas, or, as
 //! spreadsheets and R's `write.csv2` have it where the comma is the decimal mark, by semicolons or tabs.
 
-use crate::cohort::scans::ScanJob;
+use crate::cohort::job::ScanJob;
 use crate::error::{Error, Result};
 use crate::image::scan;
 use crate::pipeline::segment::SegmentParams;

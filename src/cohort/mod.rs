@@ -1,17 +1,21 @@
 //! Owns `run`: one recipe over scans and folders of scans, each scan on its own.
 
+pub mod job;
 pub mod manifest;
 pub mod queue;
 pub mod scans;
 
-use crate::cohort::scans::{ScanJob, Selection};
+use crate::cohort::job::ScanJob;
+use crate::cohort::scans::Selection;
 use crate::command::estimate::{Estimate, estimate, of_specimen};
-use crate::command::report::Failure;
-use crate::command::session::Session;
-use crate::command::{Outcome, adaptive, host, lattice, report, segment, solve};
+use crate::command::{Outcome, adaptive, lattice, report, segment, solve};
 use crate::error::{Error, Result};
 use crate::io::{atomic, table};
+use crate::machine::host;
+use crate::machine::session::Session;
 use crate::recipe::Recipe;
+use crate::record::failures;
+use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::results::Results;
 use crate::result::row::Row;
@@ -189,9 +193,9 @@ impl Run<'_> {
         let rows = self.write_rows(&done)?;
         let mut failures = failures(self.jobs, &done);
         let left_out = |name: &String| self.names.contains(name) && self.job(name).is_none();
-        let known = report::failures_in(self.out).into_iter();
+        let known = failures::failures_in(self.out).into_iter();
         failures.extend(known.filter(|failure| left_out(&failure.scan)));
-        report::write_failures(self.out, &failures)?;
+        failures::write_failures(self.out, &failures)?;
         if !rows.is_empty() {
             let recipe = toml::to_string(self.recipe).expect("settings are plain data");
             atomic::write(&self.out.join(report::RECIPE), &recipe)?;

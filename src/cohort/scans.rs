@@ -1,26 +1,15 @@
 //! Owns which scans a run is over: files, folders that are one scan, folders of scans, manifests.
 
+use crate::cohort::job::ScanJob;
 use crate::cohort::manifest;
-use crate::command::session::Session;
 use crate::error::{Error, Result};
 use crate::image::{extent, scan, slices};
+use crate::machine::session::Session;
 use crate::pipeline::segment::SegmentParams;
 use crate::record::specimen;
 use glob::Pattern;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-
-/// One scan of a run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ScanJob {
-    /// Unique in the run; names its folder and its rows.
-    pub name: String,
-    pub input: PathBuf,
-    pub segment: SegmentParams,
-    /// From a manifest, for statistics.
-    pub group: Option<String>,
-    pub subject: Option<String>,
-}
 
 /// Which scans of a folder.
 #[derive(Debug, Clone, Default)]

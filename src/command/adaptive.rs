@@ -3,28 +3,22 @@
 //! First three graded lattices (LP from the strut thickness to half of it), then pairs of voxel-FE solves whose elements
 //! differ by a factor of two, beginning at the coarsest pair that can be expected to suffice.
 
+use crate::command::ladder::{PAIRS, element_mm, suffices, voxel_fe};
 use crate::command::segment::load;
-use crate::command::session::Session;
 use crate::command::solve::{in_words, solve};
 use crate::error::Result;
+use crate::machine::session::Session;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::pipeline::apparent::{Method, SolveParams};
 use crate::pipeline::lattice::{Boundary, LatticeParams, Structure};
 use crate::record::missed::Missed;
 use crate::record::results::Results;
-use crate::result::extrapolate::{EXTRAPOLATED, expected_of_pair, with_extrapolated};
+use crate::result::extrapolate::{EXTRAPOLATED, with_extrapolated};
 use crate::result::row::Row;
-use crate::volume::Volume;
 use std::path::Path;
 
 /// Lattice parameters tried, in strut thicknesses.
 const LP_OVER_THICKNESS: [f64; 3] = [1.0, 0.75, 0.5];
-
-/// The finer of each pair of voxel-FE solves: voxels per element, elements per voxel.
-const PAIRS: [(usize, usize); 4] = [(2, 1), (1, 1), (1, 2), (1, 4)];
-
-/// A pair is worth a try where its expected error is at most this many targets.
-const MARGIN: f64 = 1.2;
 
 /// Elements that a voxel-FE solve may have at most: some 8 GiB.
 const MOST_ELEMENTS: f64 = 2.5e7;
@@ -141,37 +135,6 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         }
     }
     finish(dir, rows, target, session)
-}
-
-/// Edge of the finer elements of a pair.
-fn element_mm(bone: &Volume<u8>, (coarsen, refine): (usize, usize)) -> f64 {
-    bone.grid.voxel_mm3().cbrt() * coarsen as f64 / refine as f64
-}
-
-/// Whether a pair is worth a try.
-fn suffices(bone: &Volume<u8>, pair: (usize, usize), thickness: f64, target: f64) -> bool {
-    expected_of_pair(element_mm(bone, pair), thickness) <= MARGIN * target
-}
-
-/// What [`solve_to`] can be expected to come to for a specimen, if lattices do not suffice: the finer voxel-FE solve of the
-/// first pair that should.
-pub fn expected(bone: &Volume<u8>, target: f64, params: &SolveParams) -> SolveParams {
-    let first = |thickness| {
-        PAIRS
-            .into_iter()
-            .find(|pair| suffices(bone, *pair, thickness, target))
-    };
-    let (coarsen, refine) = plate_thickness_mm(bone).and_then(first).unwrap_or((1, 1));
-    voxel_fe(params, coarsen, refine)
-}
-
-fn voxel_fe(params: &SolveParams, coarsen: usize, refine: usize) -> SolveParams {
-    SolveParams {
-        method: Method::VoxelFe,
-        coarsen,
-        refine,
-        ..params.clone()
-    }
 }
 
 /// Algebraic and discretisation error of a row together, relative; None where either is not stated.

@@ -1,8 +1,9 @@
 //! Owns what a scan needs, memory and time: roughly from its header, to share a machine by, and from its bone.
 
-use crate::command::{adaptive, host};
+use crate::command::ladder;
 use crate::error::{Error, Result};
 use crate::image::extent;
+use crate::machine::host;
 use crate::pipeline::apparent::{Method, SolveParams, need};
 use crate::pipeline::lattice::{Boundary, Case, LatticeParams};
 use crate::recipe::Recipe;
@@ -127,7 +128,7 @@ fn lattice(size_mm: Option<[f64; 3]>, recipe: &Recipe) -> (f64, Option<f64>) {
 /// Settings that do not fit the specimen.
 pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Result<Estimate> {
     let params = &match recipe.error {
-        Some(target) => adaptive::expected(&specimen.bone, target, &recipe.solve),
+        Some(target) => ladder::expected(&specimen.bone, target, &recipe.solve),
         None => recipe.solve.clone(),
     };
     let kept = kept_bytes(specimen, params);

@@ -1,11 +1,11 @@
 //! Owns `info`: what is known of a scan, without segmenting it.
 
 use crate::error::Result;
+use crate::image::calibration::Calibration;
+use crate::image::calibration::GreyUnit;
 use crate::image::orient::Turn;
 use crate::image::scan;
-use crate::image::scanco::Calibration;
 use crate::mask::threshold;
-use crate::pipeline::segment::GreyUnit;
 use serde::Serialize;
 use std::path::Path;
 

@@ -2,13 +2,13 @@
 
 use crate::command::estimate::refuse_lattice_that_does_not_fit;
 use crate::command::segment::load;
-use crate::command::session::Session;
 use crate::discretisation::lattice::pieces::Pieces;
 use crate::discretisation::lattice::sites::Sites;
 use crate::error::{Error, Result};
 use crate::export::{lammps, vtk};
 use crate::grid::Axis;
 use crate::io::atomic;
+use crate::machine::session::Session;
 use crate::pipeline::apparent::SolveParams;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::lattice::{

@@ -2,15 +2,13 @@
 
 pub mod adaptive;
 pub mod estimate;
-pub mod host;
 pub mod info;
+mod ladder;
 pub mod lattice;
-pub mod meter;
 pub mod phantom;
 pub mod report;
 pub mod scene;
 pub mod segment;
-pub mod session;
 pub mod solve;
 pub mod stiffness;
 

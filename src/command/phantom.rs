@@ -1,9 +1,9 @@
 //! Owns `phantom` on disk: a synthetic scan as an image file, or as a folder of TIFF slices.
 
-use crate::command::session::Session;
 use crate::error::{Error, Result};
 use crate::image::{nifti, scan, tiff};
 use crate::io::atomic;
+use crate::machine::session::Session;
 use crate::pipeline::phantom as stage;
 use crate::pipeline::phantom::{PhantomParams, PhantomSummary};
 use std::path::Path;

@@ -1,12 +1,13 @@
 //! Owns `report` on disk: rows of any number of solved scans in; tables, plots and pages out.
 
-use crate::command::host;
-use crate::command::session::Session;
 use crate::error::Result;
 use crate::grid::Axis;
 use crate::io::{atomic, table};
+use crate::machine::host;
+use crate::machine::session::Session;
 use crate::measure::spheres::Spread;
 use crate::recipe::Recipe;
+use crate::record::failures::Failure;
 use crate::record::solved::Solved;
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
@@ -16,39 +17,10 @@ use crate::report::{Report, ReportParams, report as assemble};
 use crate::report::{markdown, plot};
 use crate::result::ffb::with_ffb;
 use crate::result::row::Row;
-use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The recipe as it was run, in the output folder of a run.
 pub const RECIPE: &str = "recipe.toml";
-
-/// Scans of a run that have no results, in its output folder; absent where there are none.
-const FAILED: &str = "failed.csv";
-
-/// A scan of a run that has no results: a line of `failed.csv`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
-pub struct Failure {
-    pub scan: String,
-    pub input: String,
-    pub reason: String,
-}
-
-/// What an earlier run wrote into `failed.csv`.
-pub fn failures_in(out: &Path) -> Vec<Failure> {
-    table::read(&out.join(FAILED)).unwrap_or_default()
-}
-
-/// Writes `failed.csv`, or removes that of an earlier run.
-pub fn write_failures(out: &Path, failures: &[Failure]) -> Result<()> {
-    let file = out.join(FAILED);
-    match failures.is_empty() {
-        false => table::write(&file, failures),
-        true => {
-            let _ = std::fs::remove_file(file);
-            Ok(())
-        }
-    }
-}
 
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Scans that
 /// were solved again in their own folders after the run are read from there. Returns the files written.

@@ -7,9 +7,9 @@ mod stale;
 mod writer;
 
 use crate::command::Outcome;
-use crate::command::session::Session;
 use crate::error::{Error, Result};
 use crate::io::atomic;
+use crate::machine::session::Session;
 use crate::scene::frame::Summary;
 use crate::scene::setting::Inputs;
 use crate::scene::{Scene, check, run};

@@ -1,14 +1,15 @@
 //! Owns `segment` on disk: a scan in, `mask.nii.gz`, `segment.json` and `segment.png` out, and reading them back.
 
-use crate::command::session::Session;
 use crate::draw::picture;
 use crate::error::Result;
+use crate::image::calibration::GreyUnit;
 use crate::image::scan;
 use crate::image::scan::Scan;
 use crate::io::atomic;
+use crate::machine::session::Session;
 use crate::measure::spheres::Spread;
 use crate::pipeline::segment as stage;
-use crate::pipeline::segment::{GreyUnit, SegmentParams, Voi};
+use crate::pipeline::segment::{SegmentParams, Voi};
 use crate::record::results;
 use crate::record::specimen;
 use crate::record::specimen::{Input, SegmentRecord};

@@ -1,14 +1,14 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
 use crate::command::lattice::binned;
-use crate::command::meter::Meter;
 use crate::command::segment::load;
-use crate::command::session::Session;
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
 use crate::export::{inp, vti, vtk};
 use crate::image::nifti;
 use crate::io::atomic;
+use crate::machine::meter::Meter;
+use crate::machine::session::Session;
 use crate::measure::morphometry::Morphometry;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::pipeline::apparent::fields::Recorded;

@@ -1,7 +1,7 @@
 //! Owns `solve --load stiffness` on disk: `stiffness.json`, and what of it goes into a row of `results.csv`.
 
-use crate::command::session::Session;
 use crate::error::Result;
+use crate::machine::session::Session;
 use crate::measure::stiffness::{orthotropic, young_along};
 use crate::pipeline::apparent::SolveParams;
 use crate::pipeline::apparent::stiffness::{Stiffness, solve_stiffness};

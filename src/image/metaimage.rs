@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::image::orient::{Affine, from_lps};
 use crate::image::raw;
 use crate::image::raw::{Layout, Scalar};
-use crate::image::scan::Stored;
+use crate::image::stored::Stored;
 use flate2::read::ZlibDecoder;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};

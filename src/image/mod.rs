@@ -1,8 +1,9 @@
 //! Scan readers, one format a file. [`scan`] is the one way in. They know volumes, grids and errors only.
 
-pub mod bitmap;
+pub mod calibration;
 pub mod dicom;
 pub mod extent;
+pub mod imagej;
 pub mod metaimage;
 pub mod nifti;
 pub mod npy;
@@ -11,6 +12,6 @@ pub mod orient;
 pub mod raw;
 pub mod scan;
 pub mod scanco;
-pub mod series;
 pub mod slices;
+pub mod stored;
 pub mod tiff;

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::image::orient::{Affine, column_norms};
 use crate::image::raw;
 use crate::image::raw::{Layout, Scalar};
-use crate::image::scan::Stored;
+use crate::image::stored::Stored;
 use crate::volume::Volume;
 use nifti::{NiftiHeader, writer::WriterOptions};
 use std::io::Read;

@@ -5,7 +5,7 @@ use crate::grid::Grid;
 use crate::image::orient::{Turn, turned};
 use crate::image::raw;
 use crate::image::raw::{Layout, Scalar};
-use crate::image::scan::Stored;
+use crate::image::stored::Stored;
 use crate::volume::Volume;
 use std::path::Path;
 

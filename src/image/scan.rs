@@ -2,36 +2,14 @@
 
 use crate::error::{Error, Result};
 use crate::grid::Grid;
+use crate::image::calibration::{Calibration, GreyUnit};
 use crate::image::orient;
-use crate::image::orient::Affine;
-use crate::image::scanco::Calibration;
 use crate::image::scanco::{aim, isq};
+use crate::image::stored::Stored;
 use crate::image::{dicom, metaimage, nifti, npy, nrrd, slices, tiff};
-use crate::pipeline::segment::GreyUnit;
 use crate::volume::Volume;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-
-/// What a reader found in a file, axes as stored.
-#[derive(Debug, Clone, Default)]
-pub struct Stored {
-    /// Format and storage type, as `NIfTI-1 (gzip), int16`.
-    pub format: String,
-    pub n: [usize; 3],
-    /// x fastest.
-    pub values: Vec<f32>,
-    /// None where the file does not say.
-    pub spacing_mm: Option<[f64; 3]>,
-    /// None where the file has no orientation.
-    pub affine: Option<Affine>,
-    /// Unit of the grey values where known: `HU`, `mg HA/cm3`.
-    pub unit: Option<String>,
-    /// From stored values to HU and density, where the format has its own.
-    pub calibration: Option<Calibration>,
-    /// Further facts for `info`, key and value. Never names of persons.
-    pub details: Vec<(String, String)>,
-    pub notes: Vec<String>,
-}
 
 /// A scan, ready to be segmented.
 #[derive(Debug, Clone)]

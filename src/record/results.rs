@@ -2,10 +2,10 @@
 //! `results.json`. Both are written whole after each solve; what is there for the same mask, settings and version is not
 //! redone.
 
-use crate::command::host;
-use crate::command::session::Session;
 use crate::error::{Error, Result};
 use crate::io::{atomic, table};
+use crate::machine::host;
+use crate::machine::session::Session;
 use crate::pipeline::apparent::SolveParams;
 use crate::result::extrapolate::with_extrapolated;
 use crate::result::ffb::with_ffb;

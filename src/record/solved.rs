@@ -1,9 +1,9 @@
 //! Owns reading solved scans back: the tables of runs and of single scans, the newer before the older.
 
-use crate::command::report::{Failure, failures_in};
-use crate::command::session::Session;
 use crate::error::{Error, Result};
 use crate::io::table;
+use crate::machine::session::Session;
+use crate::record::failures::{Failure, failures_in};
 use crate::record::specimen;
 use crate::result::row::Row;
 use std::path::{Path, PathBuf};

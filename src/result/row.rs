@@ -67,3 +67,60 @@ pub struct Row {
     pub conn_d_per_mm3: Option<f64>,
     pub da: Option<f64>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::table::{read, to_csv, write};
+
+    /// The contract's columns, in order; more may follow.
+    const COLUMNS: &str = "scan,method,structure,boundary,lp_mm,registration,voxel_mm,young_mpa,poisson,load,ends,axis,\
+        strain,grip_mm,tv_definition,tv_mm3,bv_tv,sites,dropped_sites,unknowns,iterations,residual,converged,e_app_mpa,\
+        e_app_reaction_mpa,e_app_stress_mpa,algebraic_error_mpa,discretization_error_mpa,wall_s,peak_mib";
+
+    fn row() -> Row {
+        Row {
+            scan: "core, \"left\"".to_owned(),
+            lp_mm: 0.1 + 0.2,
+            voxel_mm: "0.02".to_owned(),
+            residual: Some(1.0 / 3.0 * 1e-12),
+            sites: Some(7),
+            converged: Some(false),
+            ..Row::default()
+        }
+    }
+
+    #[test]
+    fn the_columns_are_the_contracts() {
+        assert!(to_csv::<Row>(&[]).starts_with(COLUMNS));
+    }
+
+    #[test]
+    fn missing_values_are_na() {
+        let text = to_csv(&[row()]);
+        assert!(
+            text.lines().nth(1).unwrap().ends_with(",NA,NA,NA,NA"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn rows_survive_writing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("results.csv");
+        write(&path, &[row(), Row::default()]).unwrap();
+        assert_eq!(read::<Row>(&path).unwrap(), [row(), Row::default()]);
+    }
+
+    #[test]
+    fn a_table_of_something_else_is_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("results.csv");
+        std::fs::write(&path, "scan,lp_mm\na,thick\n").unwrap();
+        let words = read::<Row>(&path).unwrap_err().to_string();
+        assert!(
+            words.contains("results.csv") && words.contains("lp_mm"),
+            "{words}"
+        );
+    }
+}

@@ -3,8 +3,8 @@
 //! cases (`-- thin-3 stack`). Iterations do not depend on the machine.
 
 use bonepd_ct::command::segment::in_memory;
-use bonepd_ct::command::session::Session;
 use bonepd_ct::discretisation::voxels::Planes;
+use bonepd_ct::machine::session::Session;
 use bonepd_ct::operator::held::Constrained;
 use bonepd_ct::pipeline::apparent::bricks::{Bricks, Keep};
 use bonepd_ct::pipeline::apparent::voxel_fe::{solve_voxels, supports};

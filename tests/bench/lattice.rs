@@ -7,9 +7,9 @@ mod specimen;
 
 use bonepd_ct::cohort::scans::Selection;
 use bonepd_ct::cohort::{Resources, cohort};
-use bonepd_ct::command::session::Session;
 use bonepd_ct::discretisation::lattice::sites::Sites;
 use bonepd_ct::grid::Axis;
+use bonepd_ct::machine::session::Session;
 use bonepd_ct::operator::held::Held;
 use bonepd_ct::operator::{MixedPrecision, Operator, SinglePreconditioner};
 use bonepd_ct::physics::lattice::multigrid::Springs;

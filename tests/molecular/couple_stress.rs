@@ -71,9 +71,9 @@ fn errors(layer: f64, calibrated: bool) -> [f64; 2] {
     let Physics::ContinuumMolecular(model) = &scene.physics else {
         panic!("a continuum-molecular scene")
     };
-    let setup = Setup::new(&scene, model, &Inputs::default()).unwrap();
+    let setup = Setup::new(&scene.setting, model, &Inputs::default()).unwrap();
     let elasticity = model.elasticity.as_ref().unwrap();
-    let mut solid = Solid::<3>::new(&scene, model, elasticity, &tensor, &setup).unwrap();
+    let mut solid = Solid::<3>::new(&scene.setting, model, elasticity, &tensor, &setup).unwrap();
     let positions = setup.points.positions();
     let free = |p: &[f64; 2]| p[0].abs() < wide && p[1].abs() < half;
     for (k, p) in positions.iter().enumerate().filter(|(_, p)| !free(p)) {

@@ -2,7 +2,7 @@
 
 use super::{Kept, strip_text};
 use bonepd_ct::command::scene::scene;
-use bonepd_ct::command::session::Session;
+use bonepd_ct::machine::session::Session;
 use bonepd_ct::scene::setting::Inputs;
 use bonepd_ct::scene::{Scene, run};
 

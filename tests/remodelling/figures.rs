@@ -217,6 +217,7 @@ fn regions(case: &str) {
     let scene = Scene::parse(&std::fs::read_to_string(&path).unwrap(), &path).unwrap();
     let regions = || {
         let named = scene
+            .setting
             .probe
             .iter()
             .map(|p| (p.name.as_str(), p.region.clone()));

@@ -8,7 +8,7 @@ use bonepd_ct::export::points;
 use bonepd_ct::grid::Grid;
 use bonepd_ct::image::nifti;
 use bonepd_ct::scene::Scene;
-use bonepd_ct::scene::setting::Inputs;
+use bonepd_ct::scene::setting::{Inputs, Setting};
 use bonepd_ct::volume::Volume;
 
 /// Maps and numbers of the difference to another scene: what its fields say, with its sign; other points are refused.
@@ -152,12 +152,12 @@ fn the_femur_has_as_many_points_as_the_papers() {
         };
         polygon.corners =
             points::read_corners(&pipelines().join(polygon.file.take().unwrap())).unwrap();
-        let scene = Scene {
+        let setting = Setting {
             geometry: Outline::Polygon(polygon),
-            ..scene
+            ..scene.setting
         };
         assert_eq!(
-            scene.points(&Inputs::default()).unwrap().len(),
+            setting.points(&Inputs::default()).unwrap().len(),
             21_652,
             "{name}"
         );

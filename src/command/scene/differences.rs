@@ -1,6 +1,5 @@
 //! Owns maps and numbers of the difference between two scenes on the same points.
 
-use super::writer::Scalars;
 use crate::discretisation::plane::Points;
 use crate::draw::map;
 use crate::draw::map::Range;
@@ -8,6 +7,9 @@ use crate::error::{Error, Result};
 use crate::export::points as files;
 use crate::io::atomic;
 use std::path::{Path, PathBuf};
+
+/// Scalar fields by name.
+pub type Scalars = Vec<(String, Vec<f64>)>;
 
 /// Times nearer than this, relative to their size, are the same.
 const SAME_TIME: f64 = 1e-9;

@@ -2,14 +2,14 @@
 
 mod kept;
 
-use super::differences::{self, Other};
-use crate::command::session::Session;
+use super::differences::{self, Other, Scalars};
 use crate::discretisation::plane::Points;
 use crate::draw::map;
 use crate::draw::map::Range;
 use crate::error::{Error, Result};
 use crate::export::points as files;
 use crate::io::atomic;
+use crate::machine::session::Session;
 use crate::record::history;
 use crate::report::figure::{Axis, Content, Curve, Figure, Mark, Point};
 use crate::report::plot;
@@ -18,9 +18,6 @@ use crate::scene::state::State;
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-
-/// Scalar fields by name.
-pub type Scalars = Vec<(String, Vec<f64>)>;
 
 /// How much time may pass without keeping the state anew.
 const EVERY: Duration = Duration::from_secs(10);

@@ -4,7 +4,7 @@ mod lengths;
 
 use crate::error::{Error, Result};
 use crate::image::orient::{Affine, from_lps};
-use crate::image::scan::Stored;
+use crate::image::stored::Stored;
 use dicom_object::{DefaultDicomObject, OpenFileOptions, Tag};
 use dicom_pixeldata::PixelDecoder;
 use rayon::prelude::*;

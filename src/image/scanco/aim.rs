@@ -2,10 +2,11 @@
 //! Layout after AimIO (Nodwell, Numerics88). Names of persons in the processing log are not taken over.
 
 use crate::error::{Error, Result};
+use crate::image::calibration::Calibration;
 use crate::image::raw;
 use crate::image::raw::{Layout, Scalar};
-use crate::image::scan::Stored;
-use crate::image::scanco::{Calibration, i32_at, i64_at, vax_f32};
+use crate::image::scanco::{i32_at, i64_at, vax_f32};
+use crate::image::stored::Stored;
 use std::io::Read;
 use std::path::Path;
 

@@ -2,10 +2,11 @@
 //! the header is not taken over.
 
 use crate::error::{Error, Result};
+use crate::image::calibration::Calibration;
 use crate::image::raw;
 use crate::image::raw::{Layout, Scalar};
-use crate::image::scan::Stored;
-use crate::image::scanco::{Calibration, i32_at, vax_f64};
+use crate::image::scanco::{i32_at, vax_f64};
+use crate::image::stored::Stored;
 use std::path::Path;
 
 const ADVICE: &str = "the file is truncated or no ISQ: copy it again in binary mode";
@@ -86,7 +87,7 @@ fn calibration(mu_scaling: f64, extended: &[u8]) -> Calibration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::segment::GreyUnit;
+    use crate::image::calibration::GreyUnit;
 
     /// A file as the format is described, with calibration in VAX G floats of exact binary values.
     fn isq() -> Vec<u8> {

@@ -1,15 +1,13 @@
 //! Owns TIFF: single slices, multi-page stacks, BigTIFF, ImageJ's stacks and their voxel sizes.
 
 pub mod directories;
-pub mod imagej;
 
 use crate::error::{Error, Result};
+use crate::image::imagej::{Grey, imagej, unit_mm};
 use crate::image::raw;
 use crate::image::raw::{Layout, Scalar};
-use crate::image::scan::Stored;
-use crate::image::slices;
-use crate::image::slices::Slice;
-use crate::image::tiff::imagej::{Grey, imagej, unit_mm};
+use crate::image::stored;
+use crate::image::stored::{Slice, Stored};
 use crate::volume::Volume;
 use std::fs::File;
 use std::io::{BufReader, Seek, SeekFrom};
@@ -87,7 +85,7 @@ pub fn read(path: &Path) -> Result<Stored> {
     let first = page(&mut pages, path)?;
     let (nx, ny) = (first.width, first.height);
     let mut notes = Vec::new();
-    let spacing_mm = slices::spacing(&first, &mut notes);
+    let spacing_mm = stored::spacing(&first, &mut notes);
     let stored_as = first.stored_as;
     let mut values = first.values;
     let mut nz = 1;
@@ -484,7 +482,7 @@ mod tests {
         let grid = crate::grid::Grid::new([5, 4, 3], [0.0195; 3]);
         let volume = Volume::from_vec(grid, (0..60).map(|v| v * 100 - 3000).collect());
         write_slices(dir.path(), "s", &volume).unwrap();
-        let back = slices::read(dir.path()).unwrap();
+        let back = crate::image::slices::read(dir.path()).unwrap();
         assert_eq!(back.n, grid.n);
         assert!(
             back.spacing_mm

@@ -6,7 +6,7 @@ mod region;
 mod summary;
 mod window;
 
-pub use params::{Align, AlignBox, GreyUnit, SegmentParams, Voi};
+pub use params::{Align, AlignBox, SegmentParams, Voi};
 pub use place::Rotation;
 pub use summary::SegmentSummary;
 

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
+use crate::image::calibration::GreyUnit;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -20,19 +21,6 @@ pub enum Voi {
     },
     /// A mask image on the scan's grid; non-zero is inside.
     Mask(PathBuf),
-}
-
-/// What the grey values of a Scanco scan shall mean. Other formats are read in the unit that they were saved in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum GreyUnit {
-    /// As stored.
-    Native,
-    Hu,
-    /// HU where the file holds a calibration to it, else as stored: for recipes that take scans of several formats.
-    HuWhereKnown,
-    /// Bone mineral density, mg HA/cm³.
-    Mgha,
 }
 
 /// A direction that is rotated to z, the load axis, by the shortest way.

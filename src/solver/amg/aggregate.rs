@@ -3,9 +3,11 @@
 //! Sites are told in chunks, each with the list of the few aggregates that it has part in: a site's own entry is two
 //! bytes, and sums go chunk by chunk, then list by list, in an order that does not depend on the number of threads.
 
-use super::level::NONE;
 use rayon::prelude::*;
 use std::ops::Range;
+
+/// No aggregate: padding, or a site with nothing free.
+pub const NONE: u32 = u32::MAX;
 
 /// Sites per chunk.
 pub const CHUNK: usize = 2048;

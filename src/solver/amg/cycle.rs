@@ -1,8 +1,9 @@
 //! Owns the V-cycle.
 
+use super::aggregate::NONE;
 use super::aggregate::Sums;
 use super::chebyshev::{CHUNK, Chebyshev};
-use super::level::{Level, NONE, Six};
+use super::level::{Level, Six};
 use rayon::prelude::*;
 use std::ops::Range;
 

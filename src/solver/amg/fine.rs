@@ -1,9 +1,10 @@
 //! Owns the finest level: the caller's operator, never assembled.
 
+use super::aggregate::NONE;
 use super::aggregate::{Aggregates, CHUNK, Sums};
 use super::diagonal::Diagonal;
 use super::grouping;
-use super::level::{Level, Modes, NONE, Six};
+use super::level::{Level, Modes, Six};
 use super::rigid::{self, Basis, Mat6};
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::operator::held::Held;

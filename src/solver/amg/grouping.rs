@@ -3,7 +3,7 @@
 //! On the finest level, boxes of space, each split into its connected pieces, so that struts that pass close by do not
 //! stick together; scraps join the neighbour they are tied to most. On coarser levels, a site and all its neighbours.
 
-use super::level::NONE;
+use super::aggregate::NONE;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;

@@ -4,9 +4,6 @@ use super::aggregate::Aggregates;
 use crate::operator::coarsen::VisitRow;
 use std::ops::Range;
 
-/// No aggregate: padding, or a site with nothing free.
-pub const NONE: u32 = u32::MAX;
-
 /// Six coarse unknowns per aggregate: the amplitudes of its rigid motions.
 pub type Six = [f32; 6];
 

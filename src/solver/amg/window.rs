@@ -1,6 +1,7 @@
 //! Owns the rows of a smoothed prolongator, made where a sweep over the sites needs them and dropped behind it.
 
-use super::level::{Level, Modes, NONE};
+use super::aggregate::NONE;
+use super::level::{Level, Modes};
 use crate::simd::Lanes;
 use std::collections::VecDeque;
 use std::ops::Range;

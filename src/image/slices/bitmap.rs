@@ -1,9 +1,9 @@
 //! Owns PNG and BMP slices. Neither carries a voxel size.
 
 use crate::error::{Error, Result};
+use crate::image::imagej::Grey;
 use crate::image::raw::MAX_EXPANSION;
-use crate::image::slices::Slice;
-use crate::image::tiff::imagej::Grey;
+use crate::image::stored::Slice;
 use image::DynamicImage;
 use std::path::Path;
 

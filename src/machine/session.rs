@@ -1,6 +1,6 @@
 //! Owns what all commands share: how loud, how many threads, whether to redo or only to say what would be done.
 
-use crate::command::host;
+use crate::machine::host;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};

@@ -1,28 +1,14 @@
 //! Owns folders of slices: which files belong, in which order, and their assembly into one volume.
 
+pub mod bitmap;
+pub mod series;
+
 use crate::error::{Error, Result};
-use crate::image::scan::Stored;
-use crate::image::series;
-use crate::image::series::Series;
-use crate::image::tiff::imagej::Grey;
-use crate::image::{bitmap, dicom, raw, tiff};
+use crate::image::slices::series::Series;
+use crate::image::stored::{Slice, Stored, spacing};
+use crate::image::{dicom, raw, tiff};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-
-/// One decoded slice.
-#[derive(Debug, Clone)]
-pub struct Slice {
-    pub width: usize,
-    pub height: usize,
-    pub values: Vec<f32>,
-    /// Storage type, as `uint16`.
-    pub stored_as: &'static str,
-    /// Voxel size where the slice's file carries one; z is None where only the pixel's size is known.
-    pub pixel_mm: Option<[f64; 2]>,
-    pub slice_mm: Option<f64>,
-    /// What ImageJ notes of the values; they are as it says.
-    pub grey: Grey,
-}
 
 /// Files of a folder that are slices of one scan, in order: DICOM's by their names (`s2` before `s10`; their positions decide
 /// later), others by the number in the name.
@@ -239,17 +225,6 @@ fn logged_pixel_mm(folder: &Path) -> Option<f64> {
     sizes
         .rfind(|v| v.is_finite() && *v > 0.0)
         .map(|um| um / 1000.0)
-}
-
-/// Voxel size from a slice; the distance of slices is taken as the pixel's where it is not told.
-pub fn spacing(slice: &Slice, notes: &mut Vec<String>) -> Option<[f64; 3]> {
-    let [x, y] = slice.pixel_mm?;
-    if slice.slice_mm.is_none() {
-        notes.push(
-            "the distance between slices is not in the file: taken as the pixel's height".into(),
-        );
-    }
-    Some([x, y, slice.slice_mm.unwrap_or(y)])
 }
 
 #[cfg(test)]

@@ -1,0 +1,86 @@
+//! Settings that several verbs take: tissue, lattices.
+
+use super::words;
+use bonepd_ct::error::{Error, Result};
+use bonepd_ct::physics::material::{Law, Material};
+use bonepd_ct::pipeline::apparent::SolveParams;
+use bonepd_ct::pipeline::lattice::{Boundary, LatticeParams, Structure};
+use clap::Args;
+
+/// What bone is made of.
+#[derive(Args)]
+pub struct TissueSettings {
+    /// Young's modulus of the bone tissue in MPa [default: 1000]
+    #[arg(long, value_name = "E", value_parser = words::positive)]
+    young_mpa: Option<f64>,
+    /// Moduli that differ from voxel to voxel: labels:100=6829/0.3,127=10000 (E, and ν if another), power:C,N (E = C·ρ^N),
+    /// linear:A,B (E = A·ρ + B), homminga:FULL[,N] (E = young-mpa·(ρ/FULL)^N, N 1.7); ρ are the scan's values. Needs
+    /// `segment --keep-grey` or `--labels`
+    #[arg(long, value_name = "LAW", value_parser = words::material)]
+    material: Option<Law>,
+    /// Density of the law is SLOPE·value + INTERCEPT [default: the scan's values]
+    #[arg(long, value_name = "SLOPE,INTERCEPT", value_parser = words::pair, allow_hyphen_values = true)]
+    density: Option<[f64; 2]>,
+    /// Raise smaller moduli of a law to this
+    #[arg(long, value_name = "E", value_parser = words::positive)]
+    least_mpa: Option<f64>,
+}
+
+impl TissueSettings {
+    /// What was said here wins over `params`.
+    pub fn apply(&self, params: &mut SolveParams) -> Result<()> {
+        params.young_mpa = self.young_mpa.unwrap_or(params.young_mpa);
+        if let Some(law) = &self.material {
+            params.material = Some(Material::new(law.clone()));
+        }
+        match &mut params.material {
+            Some(material) => {
+                material.density = self.density.unwrap_or(material.density);
+                material.least_mpa = self.least_mpa.or(material.least_mpa);
+            }
+            None if self.density.is_some() || self.least_mpa.is_some() => {
+                return Err(Error::setting(
+                    "--density, --least-mpa",
+                    "they belong to a law of moduli, and none is given",
+                    "add --material, or leave them out",
+                ));
+            }
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Lattice")]
+pub struct LatticeSettings {
+    /// Lattice structures, comma-separated [default: sc]
+    #[arg(long, value_delimiter = ',', value_parser = words::choice::<Structure>(&["sc", "bcc", "fcc"]))]
+    structure: Vec<Structure>,
+    /// Lattice parameters in mm, comma-separated [default: 0.06,0.08,0.10,0.12]
+    #[arg(long, value_name = "MM", value_delimiter = ',', value_parser = words::positive)]
+    lp: Vec<f64>,
+    /// How the lattice meets the bone's surface, comma-separated [default: firm,floppy]
+    #[arg(long, value_delimiter = ',', value_parser = words::choice::<Boundary>(&["firm", "floppy", "graded"]))]
+    boundary: Vec<Boundary>,
+    /// Shift the lattice by this many mm along x, y, z
+    #[arg(long, value_name = "X,Y,Z", value_parser = words::triple, allow_hyphen_values = true)]
+    registration: Option<[f64; 3]>,
+}
+
+impl LatticeSettings {
+    /// What was said here wins over `params`.
+    pub fn apply(&self, params: &mut LatticeParams) -> Result<()> {
+        if !self.structure.is_empty() {
+            params.structure = self.structure.clone();
+        }
+        if !self.lp.is_empty() {
+            params.lp_mm = self.lp.clone();
+        }
+        if !self.boundary.is_empty() {
+            params.boundary = self.boundary.clone();
+        }
+        params.registration_mm = self.registration.unwrap_or(params.registration_mm);
+        params.check()
+    }
+}

@@ -1,0 +1,52 @@
+//! Owns what a reader found in a file, before orientation and units are applied.
+
+use crate::image::calibration::Calibration;
+use crate::image::imagej::Grey;
+use crate::image::orient::Affine;
+
+/// What a reader found in a file, axes as stored.
+#[derive(Debug, Clone, Default)]
+pub struct Stored {
+    /// Format and storage type, as `NIfTI-1 (gzip), int16`.
+    pub format: String,
+    pub n: [usize; 3],
+    /// x fastest.
+    pub values: Vec<f32>,
+    /// None where the file does not say.
+    pub spacing_mm: Option<[f64; 3]>,
+    /// None where the file has no orientation.
+    pub affine: Option<Affine>,
+    /// Unit of the grey values where known: `HU`, `mg HA/cm3`.
+    pub unit: Option<String>,
+    /// From stored values to HU and density, where the format has its own.
+    pub calibration: Option<Calibration>,
+    /// Further facts for `info`, key and value. Never names of persons.
+    pub details: Vec<(String, String)>,
+    pub notes: Vec<String>,
+}
+
+/// One decoded slice.
+#[derive(Debug, Clone)]
+pub struct Slice {
+    pub width: usize,
+    pub height: usize,
+    pub values: Vec<f32>,
+    /// Storage type, as `uint16`.
+    pub stored_as: &'static str,
+    /// Voxel size where the slice's file carries one; z is None where only the pixel's size is known.
+    pub pixel_mm: Option<[f64; 2]>,
+    pub slice_mm: Option<f64>,
+    /// What ImageJ notes of the values; they are as it says.
+    pub grey: Grey,
+}
+
+/// Voxel size from a slice; the distance of slices is taken as the pixel's where it is not told.
+pub fn spacing(slice: &Slice, notes: &mut Vec<String>) -> Option<[f64; 3]> {
+    let [x, y] = slice.pixel_mm?;
+    if slice.slice_mm.is_none() {
+        notes.push(
+            "the distance between slices is not in the file: taken as the pixel's height".into(),
+        );
+    }
+    Some([x, y, slice.slice_mm.unwrap_or(y)])
+}

@@ -8,9 +8,9 @@ use bonepd_ct::par::dot;
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::{Integration, stiffness};
 use bonepd_ct::physics::hex8::graded::Graded;
-use bonepd_ct::physics::lattice::pieces::GradedLattice;
+use bonepd_ct::physics::lattice::connected::ConnectedLattice;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build, build_pieces};
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build, build_connected};
 use bonepd_ct::solver::cg::jacobi::Jacobi;
 use bonepd_ct::solver::cg::{CgParams, ENERGY_ALONE, minimise};
 use bonepd_ct::volume::{Specimen, Volume};
@@ -133,11 +133,11 @@ fn models() -> Vec<Model> {
             }
         }
     }
-    rows.extend([0.0, 0.25, 0.3, 0.45].map(pieces_row));
+    rows.extend([0.0, 0.25, 0.3, 0.45].map(connected_row));
     rows
 }
 
-fn pieces_row(poisson: f64) -> Model {
+fn connected_row(poisson: f64) -> Model {
     let case = Case {
         structure: Structure::Sc,
         lp_mm: 0.04,
@@ -145,7 +145,7 @@ fn pieces_row(poisson: f64) -> Model {
         registration_mm: [0.0; 3],
     };
     let pieces = Box::leak(Box::new(
-        build_pieces(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap(),
+        build_connected(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap(),
     ));
     assert!(pieces.len() > 100, "{} pieces", pieces.len());
     let moduli = Moduli::new(Structure::Sc, 0.04, 1000.0, poisson).unwrap();
@@ -154,10 +154,10 @@ fn pieces_row(poisson: f64) -> Model {
         .iter()
         .map(|&i| pieces.frame.position_mm(i))
         .collect();
-    let twin = GradedLattice::new(pieces, moduli);
+    let twin = ConnectedLattice::new(pieces, moduli);
     Model {
         name: format!("sc graded in pieces ν={poisson}"),
-        operator: Box::new(GradedLattice::new(pieces, moduli)),
+        operator: Box::new(ConnectedLattice::new(pieces, moduli)),
         positions,
         energy: Box::new(move |u| twin.energy(u)),
     }

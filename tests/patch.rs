@@ -3,9 +3,9 @@
 use bonepd_ct::discretisation::lattice::sites::Sites;
 use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::operator::Operator;
-use bonepd_ct::physics::lattice::pieces::GradedLattice;
+use bonepd_ct::physics::lattice::connected::ConnectedLattice;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build, build_pieces};
+use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build, build_connected};
 use bonepd_ct::volume::{Specimen, Volume};
 
 const LP_MM: f64 = 0.1;
@@ -130,7 +130,7 @@ fn a_graded_lattice_of_solid_bone_has_its_stiffness() {
         boundary: Boundary::Graded,
         registration_mm: [0.0; 3],
     };
-    let pieces = build_pieces(&block(), &case, Axis::Z, 0.0).unwrap();
+    let pieces = build_connected(&block(), &case, Axis::Z, 0.0).unwrap();
     let site = (0..pieces.len())
         .find(|&s| (0..3).all(|a| (2..4).contains(&pieces.indices[s][a])))
         .expect("a block has an inside");
@@ -145,7 +145,7 @@ fn a_graded_lattice_of_solid_bone_has_its_stiffness() {
         .collect();
     for nu in POISSONS {
         let moduli = Moduli::new(Structure::Sc, LP_MM, YOUNG_MPA, nu).unwrap();
-        let model = GradedLattice::new(&pieces, moduli);
+        let model = ConnectedLattice::new(&pieces, moduli);
         let lambda = YOUNG_MPA * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
         let mu = YOUNG_MPA / (2.0 * (1.0 + nu));
         let trace: f64 = (0..3).map(|a| strain[a][a]).sum();

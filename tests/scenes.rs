@@ -300,8 +300,8 @@ fn scenes_that_cannot_work_are_refused() {
         format!("{}{}", &text[..start], &text[end..])
     };
     let whole = format!("{disc}{BODY}{}", physics(growth));
-    let in_pieces = whole.replace("keep_largest = true", "");
-    let in_pieces = in_pieces.replace(disc, "geometry.image.file = 'pieces.png'\n");
+    let is_connected = whole.replace("keep_largest = true", "");
+    let is_connected = is_connected.replace(disc, "geometry.image.file = 'pieces.png'\n");
     let same = format!(
         "{disc}{BODY}{}",
         physics(
@@ -309,7 +309,7 @@ fn scenes_that_cannot_work_are_refused() {
         )
     );
     let cases = [
-        (in_pieces, "2 unconnected pieces"),
+        (is_connected, "2 unconnected pieces"),
         (held(whole.clone()), "nothing holds the body along x"),
         (same, "n = 3 is not below m = 3"),
         (

@@ -295,7 +295,7 @@ fn solve(case: &Case, params: &SolveParams) -> Result<Solved, bonepd_ct::error::
 }
 
 fn outcome(case: &Case) -> Outcome {
-    // Pieces of graded lattices share places on the grid, which the count cannot tell apart.
+    // ConnectedSites of graded lattices share places on the grid, which the count cannot tell apart.
     let counted = SolveParams {
         mechanisms: !matches!(case.model, Model::Lattice(_, Boundary::Graded, _)),
         ..case.params.clone()

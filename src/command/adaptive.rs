@@ -11,7 +11,7 @@ use crate::machine::session::Session;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::pipeline::apparent::{Method, SolveParams};
 use crate::pipeline::lattice::{Boundary, LatticeParams, Structure};
-use crate::record::missed::Missed;
+use crate::record::error_target_note::Missed;
 use crate::record::results::Results;
 use crate::result::extrapolate::{EXTRAPOLATED, with_extrapolated};
 use crate::result::row::Row;

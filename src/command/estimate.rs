@@ -4,7 +4,7 @@ use crate::command::ladder;
 use crate::error::{Error, Result};
 use crate::image::extent;
 use crate::machine::host;
-use crate::pipeline::apparent::{Method, SolveParams, need};
+use crate::pipeline::apparent::{Method, SolveParams, memory};
 use crate::pipeline::lattice::{Boundary, Case, LatticeParams};
 use crate::recipe::Recipe;
 use crate::volume::Specimen;
@@ -190,7 +190,7 @@ fn needed(specimen: &Specimen, case: Option<&Case>, params: &SolveParams) -> Res
     let least = case.map_or(0.0, |case| bounds(specimen, case)[0]);
     match host::available_mib() {
         Some(free) if mib(least) > free => Ok(least),
-        _ => need::of(specimen, case, params),
+        _ => memory::of(specimen, case, params),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::command::estimate::refuse_lattice_that_does_not_fit;
 use crate::command::segment::load;
-use crate::discretisation::lattice::pieces::Pieces;
+use crate::discretisation::lattice::connected::ConnectedSites;
 use crate::discretisation::lattice::sites::Sites;
 use crate::error::{Error, Result};
 use crate::export::{lammps, vtk};
@@ -12,7 +12,8 @@ use crate::machine::session::Session;
 use crate::pipeline::apparent::SolveParams;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::lattice::{
-    Case, LatticeParams, LatticeSummary, build, build_of, build_pieces, summarise, summarise_pieces,
+    Case, LatticeParams, LatticeSummary, build, build_connected, build_of, summarise,
+    summarise_connected,
 };
 use crate::record::specimen;
 use serde::{Deserialize, Serialize};
@@ -94,10 +95,10 @@ pub fn lattice(
     let mut lattices = Vec::new();
     for case in params.cases() {
         refuse_lattice_that_does_not_fit(&specimen, &case)?;
-        let summary = if case.in_pieces() {
-            let pieces = build_pieces(&specimen, &case, Axis::Z, 0.0)?;
+        let summary = if case.is_connected() {
+            let pieces = build_connected(&specimen, &case, Axis::Z, 0.0)?;
             written.pieces(&case, &pieces)?;
-            summarise_pieces(&specimen, &case, &pieces)
+            summarise_connected(&specimen, &case, &pieces)
         } else {
             let sites = build(&specimen, &case, Axis::Z, 0.0)?;
             match &factors {
@@ -163,10 +164,10 @@ impl Written<'_> {
         Ok(())
     }
 
-    fn pieces(&self, case: &Case, pieces: &Pieces) -> Result<()> {
+    fn pieces(&self, case: &Case, pieces: &ConnectedSites) -> Result<()> {
         for format in self.formats {
             match format {
-                Export::Vtk => vtk::write_pieces(&self.path(case, "vtk"), pieces)?,
+                Export::Vtk => vtk::write_connected(&self.path(case, "vtk"), pieces)?,
                 Export::Lammps => return Err(lammps::pieces()),
             }
         }

@@ -1,9 +1,9 @@
 //! Owns `scene` on disk: a scene file in, histories, fields, maps and a record out. Everything is written as the scene
 //! runs, so that a scene that stops early leaves its last good state.
 
+mod clear_previous;
 mod differences;
 mod inputs;
-mod stale;
 mod writer;
 
 use crate::command::Outcome;
@@ -61,7 +61,7 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
     let fingerprint = fingerprint(&scene, &inputs);
     let mut writer = Writer::new(out, &scene.setting.output, folder, fingerprint, session);
     if !writer.goes_on() {
-        stale::clear(out)?;
+        clear_previous::clear(out)?;
     }
     let summary = run(&scene, &inputs, &mut writer)?;
     writer.finish()?;

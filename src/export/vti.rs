@@ -28,7 +28,7 @@ pub fn write(path: &Path, arrays: &[(&str, &Volume<f32>)]) -> Result<()> {
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" \
          header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n\
          <ImageData WholeExtent=\"{extent}\" Origin=\"{}\" Spacing=\"{}\" Direction=\"{}\">\n\
-         <Piece Extent=\"{extent}\">\n<CellData>\n",
+         <Component Extent=\"{extent}\">\n<CellData>\n",
         list(&origin),
         list(&[sx, sy, sz]),
         list(&direction),
@@ -40,7 +40,7 @@ pub fn write(path: &Path, arrays: &[(&str, &Volume<f32>)]) -> Result<()> {
         );
         offset += block.len();
     }
-    head += "</CellData>\n</Piece>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_";
+    head += "</CellData>\n</Component>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_";
     atomic::write_with(path, |out| {
         out.write_all(head.as_bytes())?;
         blocks.iter().try_for_each(|block| out.write_all(block))?;

@@ -1,6 +1,6 @@
 //! Owns lattices for ParaView and OVITO, plain or with their fields: legacy VTK files, binary (big-endian).
 
-use crate::discretisation::lattice::pieces::Pieces;
+use crate::discretisation::lattice::connected::ConnectedSites;
 use crate::discretisation::lattice::placement::Frame;
 use crate::discretisation::lattice::sites::Sites;
 use crate::error::Result;
@@ -26,9 +26,9 @@ pub fn write_lattice(path: &Path, sites: &Sites) -> Result<()> {
     write(path, &sites.frame, &sites.indices, &bonds, &weights)
 }
 
-/// [`write_lattice`] for the pieces of a graded lattice: the weight is a piece's bone fraction. Pieces of one cell lie
+/// [`write_lattice`] for the pieces of a graded lattice: the weight is a piece's bone fraction. ConnectedSites of one cell lie
 /// at one point.
-pub fn write_pieces(path: &Path, pieces: &Pieces) -> Result<()> {
+pub fn write_connected(path: &Path, pieces: &ConnectedSites) -> Result<()> {
     let bonds: Vec<[u32; 2]> = pieces.pairs().map(|(a, b)| [a, b]).collect();
     write(
         path,

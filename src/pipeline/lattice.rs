@@ -1,6 +1,6 @@
 //! Owns the lattice stage: from a specimen to the sites of one lattice.
 
-use crate::discretisation::lattice::pieces::Pieces;
+use crate::discretisation::lattice::connected::ConnectedSites;
 pub use crate::discretisation::lattice::placement::Boundary;
 use crate::discretisation::lattice::placement::{Frame, weigh};
 use crate::discretisation::lattice::sites::{Grips, Sites};
@@ -106,7 +106,7 @@ impl Case {
     }
 
     /// Whether its sites are connected pieces of bone: graded SC lattices.
-    pub fn in_pieces(&self) -> bool {
+    pub fn is_connected(&self) -> bool {
         self.boundary == Boundary::Graded && self.structure == Structure::Sc
     }
 }
@@ -153,7 +153,12 @@ pub fn values_of(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sites
 ///
 /// # Errors
 /// As [`build`].
-pub fn build_pieces(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<Pieces> {
+pub fn build_connected(
+    specimen: &Specimen,
+    case: &Case,
+    axis: Axis,
+    grip_mm: f64,
+) -> Result<ConnectedSites> {
     let lp = case.lp_mm;
     let wrapped = Case {
         // Shifts by whole cells change nothing, but would leave the bone on one side without cells.
@@ -161,7 +166,7 @@ pub fn build_pieces(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) 
         ..*case
     };
     let (frame, grips) = lay(specimen, &wrapped, axis, grip_mm)?;
-    Ok(Pieces::connect(frame, &specimen.bone, grips))
+    Ok(ConnectedSites::connect(frame, &specimen.bone, grips))
 }
 
 fn lay(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Frame, Grips)> {
@@ -222,7 +227,11 @@ pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSumm
 }
 
 /// [`summarise`] for a lattice of pieces. Fully coordinated are those with a neighbour along every bond.
-pub fn summarise_pieces(specimen: &Specimen, case: &Case, pieces: &Pieces) -> LatticeSummary {
+pub fn summarise_connected(
+    specimen: &Specimen,
+    case: &Case,
+    pieces: &ConnectedSites,
+) -> LatticeSummary {
     let bone: f64 = pieces.fractions.iter().map(|&f| f64::from(f)).sum();
     let directions = case.structure.stencil().coordination();
     let whole = |s: &usize| {

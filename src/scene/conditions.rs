@@ -57,7 +57,7 @@ impl Region {
             Region::Outside(c) => r2(c) > c[2] * c[2],
             Region::Point(p) => points.nearest(*p) == Some(i),
             Region::Polygon(corners) => {
-                crate::discretisation::plane::outline::winds(corners, [x, y])
+                crate::discretisation::plane::geometry::winds(corners, [x, y])
             }
         }
     }

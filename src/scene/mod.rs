@@ -10,7 +10,7 @@ pub mod setting;
 pub mod state;
 
 use crate::discretisation::plane::Points;
-use crate::discretisation::plane::outline::Outline;
+use crate::discretisation::plane::geometry::Geometry;
 use crate::error::{Error, Result};
 use conditions::{Hold, Layers, Load, Time};
 use continuum_molecular::Molecular;
@@ -35,7 +35,7 @@ pub struct Scene {
 #[serde(deny_unknown_fields)]
 struct SceneFile {
     title: String,
-    geometry: Outline,
+    geometry: Geometry,
     grid: GridParams,
     #[serde(default)]
     layers: Option<Layers>,

@@ -2,7 +2,7 @@
 
 use crate::discretisation::plane::Points;
 use crate::discretisation::plane::family::Stencil;
-use crate::discretisation::plane::outline::{Bitmap, Outline};
+use crate::discretisation::plane::geometry::{Bitmap, Geometry};
 use crate::error::{Error, Result};
 use crate::scene::conditions::{Hold, Layers, Load, Region, Time};
 use crate::scene::frame::Output;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub struct Setting {
     /// One line on what the scene shows.
     pub title: String,
-    pub geometry: Outline,
+    pub geometry: Geometry,
     pub grid: GridParams,
     /// Fictitious points beyond edges of the geometry.
     pub layers: Option<Layers>,

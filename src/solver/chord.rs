@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::operator::nonlinear::Staggered;
 use crate::operator::sparse::Sparse;
 use crate::solver::anderson::Anderson;
-use crate::solver::direct::rough::RoughLlt;
+use crate::solver::direct::cholesky_f32::SingleCholesky;
 use crate::solver::direct::{DirectLlt, DirectLu};
 use crate::solver::newton::NotConverged;
 
@@ -25,7 +25,7 @@ pub struct Chord {
 /// Single precision, until a matrix proves too ill-conditioned for it; without square roots' demand of definiteness, once
 /// one is not positive definite (bonds under compression at a clamped corner).
 enum Factor {
-    Single(Box<RoughLlt>),
+    Single(Box<SingleCholesky>),
     Double(Box<DirectLlt>),
     Indefinite(Box<DirectLu>),
 }
@@ -55,7 +55,7 @@ impl Chord {
         max_iterations: usize,
     ) -> Result<Self> {
         Ok(Chord {
-            factor: Factor::Single(Box::new(RoughLlt::new(&pattern, &order)?)),
+            factor: Factor::Single(Box::new(SingleCholesky::new(&pattern, &order)?)),
             stiffness: pattern,
             order,
             ready: false,

@@ -6,7 +6,7 @@ mod specimen;
 
 use bonepd_ct::pipeline::apparent::SolveParams;
 use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
-use bonepd_ct::pipeline::apparent::need;
+use bonepd_ct::pipeline::apparent::memory;
 use bonepd_ct::pipeline::apparent::solved::Solved;
 use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
 use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure};
@@ -103,13 +103,13 @@ fn main() {
             report(
                 &format!("lattice {} {}", structure.name(), boundary.name()),
                 &|| solve_lattice(&bone, &case, &params, |_| ()).expect("a lattice that fits"),
-                &|| need::of_lattice(&bone, &case, &params).expect("a lattice that fits"),
+                &|| memory::of_lattice(&bone, &case, &params).expect("a lattice that fits"),
             );
         }
         report(
             "voxel-fe",
             &|| solve_voxels(&bone, &params, |_| ()).expect("a mesh that fits"),
-            &|| need::of_voxel_fe(&bone, &params),
+            &|| memory::of_voxel_fe(&bone, &params),
         );
     }
 }

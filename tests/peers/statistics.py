@@ -1,4 +1,4 @@
-"""What SciPy, statsmodels, pingouin and NumPy find for the data of `src/measure/statistics/mod.rs`.
+"""What SciPy, statsmodels, pingouin and NumPy find for the data of `src/result/statistics/mod.rs`.
 
     python3 -m venv venv && venv/bin/pip install scipy statsmodels pandas pingouin
     venv/bin/python tests/peers/statistics.py            # checks the values committed in the tests
@@ -24,7 +24,7 @@ try:
 except ImportError as missing:
     sys.exit(f"skipped: {missing}; pip install scipy statsmodels pandas pingouin")
 
-ROOT = pathlib.Path(__file__).resolve().parents[2] / "src/measure/statistics"
+ROOT = pathlib.Path(__file__).resolve().parents[2] / "src/result/statistics"
 
 
 def data():

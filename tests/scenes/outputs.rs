@@ -2,7 +2,7 @@
 
 use super::{BODY, pipelines, run_scene};
 use bonepd_ct::discretisation::plane::Points;
-use bonepd_ct::discretisation::plane::outline::Outline;
+use bonepd_ct::discretisation::plane::geometry::Geometry;
 use bonepd_ct::draw::map;
 use bonepd_ct::export::points;
 use bonepd_ct::grid::Grid;
@@ -147,13 +147,13 @@ fn the_femur_has_as_many_points_as_the_papers() {
         let path = pipelines().join(format!("{name}.toml"));
         let text = std::fs::read_to_string(&path).unwrap();
         let scene = Scene::parse(&text, &path).unwrap();
-        let Outline::Polygon(mut polygon) = scene.setting.geometry.clone() else {
+        let Geometry::Polygon(mut polygon) = scene.setting.geometry.clone() else {
             panic!("{name} has another outline");
         };
         polygon.corners =
             points::read_corners(&pipelines().join(polygon.file.take().unwrap())).unwrap();
         let setting = Setting {
-            geometry: Outline::Polygon(polygon),
+            geometry: Geometry::Polygon(polygon),
             ..scene.setting
         };
         assert_eq!(

@@ -1,6 +1,6 @@
 //! Owns the reading of what a scene's file names: outlines, images, slices of scans, an apparent stiffness.
 
-use crate::discretisation::plane::outline::{Bitmap, Outline, Slice};
+use crate::discretisation::plane::geometry::{Bitmap, Geometry, Slice};
 use crate::draw::map;
 use crate::error::{Error, Result};
 use crate::export::points;
@@ -13,13 +13,13 @@ use std::path::Path;
 /// Files that a scene's geometry names, relative to the scene file. `say` is told what a user should know of them.
 pub fn read(scene: &mut Scene, folder: &Path, say: impl Fn(String)) -> Result<Inputs> {
     match &mut scene.setting.geometry {
-        Outline::Polygon(polygon) => {
+        Geometry::Polygon(polygon) => {
             if let Some(file) = &polygon.file {
                 polygon.corners = points::read_corners(&folder.join(file))?;
             }
             Ok(Inputs::default())
         }
-        Outline::Image(image) => {
+        Geometry::Image(image) => {
             let (n, values) = map::read_brightness(&folder.join(&image.file))?;
             let inside = values.iter().map(|v| *v >= 0.5).collect();
             Ok(Inputs {
@@ -28,7 +28,7 @@ pub fn read(scene: &mut Scene, folder: &Path, say: impl Fn(String)) -> Result<In
                 ..Inputs::default()
             })
         }
-        Outline::Slice(slice) => {
+        Geometry::Slice(slice) => {
             let mask = read_section(&folder.join(&slice.file), slice)?;
             let grey = match &slice.grey {
                 Some(file) => {

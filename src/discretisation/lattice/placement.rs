@@ -18,7 +18,7 @@ pub enum Boundary {
     /// Sites whose position lies in a bone voxel.
     Floppy,
     /// Sites weighted by the bone in their cell. SC: a site for each of its connected pieces
-    /// ([`crate::discretisation::lattice::pieces`]); BCC, FCC: by its fraction.
+    /// ([`crate::discretisation::lattice::connected`]); BCC, FCC: by its fraction.
     Graded,
 }
 

@@ -1,8 +1,8 @@
 //! Owns the points of a two-dimensional scene: cells of a regular grid, numbered row by row.
 
 pub mod family;
+pub mod geometry;
 pub mod layers;
-pub mod outline;
 
 use crate::error::{Error, Result};
 

@@ -9,9 +9,9 @@
 
 pub mod moduli;
 
+pub mod connected;
 mod kernel;
 pub mod multigrid;
-pub mod pieces;
 mod scaled;
 
 use crate::discretisation::lattice::sites::Sites;

@@ -9,16 +9,16 @@ use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision, Operator};
 use crate::physics::lattice;
 use crate::physics::lattice::Lattice;
+use crate::physics::lattice::connected::{ConnectedLattice, ConnectedSprings};
 use crate::physics::lattice::multigrid::Springs;
-use crate::physics::lattice::pieces::{GradedLattice, GradedSprings};
-use crate::pipeline::apparent::blend::Blend;
 use crate::pipeline::apparent::fields::SiteFields;
 use crate::pipeline::apparent::mechanisms::mechanisms;
+use crate::pipeline::apparent::mixed_tissue::Blend;
 use crate::pipeline::apparent::solved::{Moduli, Solved};
 use crate::pipeline::apparent::stress::Stress;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::{Ends, Load, SolveParams};
-use crate::pipeline::lattice::{Boundary, Case, build_of, build_pieces, values_of};
+use crate::pipeline::lattice::{Boundary, Case, build_connected, build_of, values_of};
 use crate::result::row::Row;
 use crate::solver::amg::{Amg, AmgParams};
 use crate::solver::cg::fallback::minimise_or_fall_back;
@@ -57,14 +57,14 @@ pub fn solve_recorded(
     let tissue = Tissue::of(specimen, params)?;
     let blend = Blend::of(&tissue, case)?;
     let moduli = blend.moduli;
-    if case.in_pieces() && blend.springs.is_some() {
+    if case.is_connected() && blend.springs.is_some() {
         return Err(Error::setting(
             "solve.material",
             "graded SC lattices are of one tissue",
             "use firm and floppy lattices, or add --method voxel-fe",
         ));
     }
-    if case.in_pieces() {
+    if case.is_connected() {
         if params.mechanisms {
             return Err(Error::setting(
                 "mechanisms",
@@ -72,7 +72,7 @@ pub fn solve_recorded(
                 "count mechanisms on firm and floppy lattices or with --method voxel-fe",
             ));
         }
-        let pieces = build_pieces(specimen, case, params.axis, params.grip_mm)?;
+        let pieces = build_connected(specimen, case, params.axis, params.grip_mm)?;
         if pieces.is_empty() {
             return Ok((Solved::disconnected(pieces.dropped), None));
         }
@@ -82,8 +82,8 @@ pub fn solve_recorded(
             grips: pieces.grips,
             dropped: pieces.dropped,
         };
-        let model = GradedLattice::new(&pieces, moduli);
-        let springs = GradedSprings(&model);
+        let model = ConnectedLattice::new(&pieces, moduli);
+        let springs = ConnectedSprings(&model);
         let stress = Stress {
             model: &model,
             counts: None,

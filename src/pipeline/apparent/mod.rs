@@ -1,11 +1,11 @@
 //! Owns the solve stage: material, load, supports and accuracy in, apparent moduli out.
 
-mod blend;
 pub mod bricks;
 pub mod fields;
 pub mod lattice;
 pub mod mechanisms;
-pub mod need;
+pub mod memory;
+mod mixed_tissue;
 pub mod solved;
 pub mod stiffness;
 mod stress;

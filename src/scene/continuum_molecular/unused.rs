@@ -2,7 +2,7 @@
 
 use super::sweep::Parameter;
 use super::{KnownField, Molecular};
-use crate::discretisation::plane::outline::Outline;
+use crate::discretisation::plane::geometry::Geometry;
 use crate::error::{Error, Result};
 use crate::scene::setting::Setting;
 
@@ -60,7 +60,7 @@ fn tables(model: &Molecular) -> Vec<Rule> {
 /// What other kinds of scenes have, and time.
 fn of_scene(scene: &Setting, model: &Molecular) -> Vec<Rule> {
     let marching = "a setting of scenes of remodelling: here all steps are `step`";
-    let nodal = matches!(&scene.geometry, Outline::Rectangle(r) if r.nodal);
+    let nodal = matches!(&scene.geometry, Geometry::Rectangle(r) if r.nodal);
     let time = scene.time.as_ref();
     let capacity = model
         .conduction

@@ -11,7 +11,7 @@ use super::setup::Setup;
 use crate::error::Result;
 use crate::physics::continuum_molecular::body::Body;
 use crate::physics::continuum_molecular::bond::Blocks;
-use crate::solver::direct::zone::Zone;
+use crate::solver::direct::schur::SchurComplement;
 use lost::{add_forces, entries};
 
 const OUTSIDE: u32 = u32::MAX;
@@ -29,7 +29,7 @@ pub struct Cut {
 /// Equilibrium under unit load of a body some of whose bonds are broken after its factorisation.
 pub struct Window<const D: usize> {
     factorised: Factorised,
-    zone: Zone,
+    zone: SchurComplement,
     /// Points of the window, in order of elimination.
     points: Vec<u32>,
     local: Vec<u32>,
@@ -68,7 +68,7 @@ impl<const D: usize> Window<D> {
         let mut factorised = factorise(body, &setup.points, held, &[], chosen)?;
         let load = right_hand_side(body, &factorised, held, &[]);
         let size = chosen.len() * D;
-        let zone = Zone::new(&factorised.llt.corner(size), size);
+        let zone = SchurComplement::new(&factorised.llt.corner(size), size);
         let mut q = load.clone();
         factorised.llt.solve(&mut q);
         let x = factorised.expand(&q, held);

@@ -8,7 +8,7 @@
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision, SinglePreconditioner};
 use crate::par::{CHUNK, sum_chunks};
-use crate::solver::cg::estimate::EnergyTail;
+use crate::solver::cg::error::EnergyTail;
 use crate::solver::cg::{
     CgInfo, CgParams, CgStep, Ended, NOTHING, State, checked, energy_error, goal_error, met,
 };

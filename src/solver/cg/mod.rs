@@ -1,6 +1,6 @@
 //! Owns preconditioned conjugate gradients for `minimise ½ uᵀ A u` under prescribed unknowns.
 
-pub mod estimate;
+pub mod error;
 pub mod fallback;
 pub mod jacobi;
 pub mod mixed;
@@ -8,7 +8,7 @@ pub mod mixed;
 use crate::operator::held::{Constrained, Held};
 use crate::operator::{Functional, Operator, Preconditioner};
 use crate::par::{CHUNK, dot};
-use crate::solver::cg::estimate::EnergyTail;
+use crate::solver::cg::error::EnergyTail;
 use rayon::prelude::*;
 
 /// When to stop.

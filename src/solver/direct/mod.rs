@@ -1,9 +1,9 @@
 //! Owns sparse direct solution by faer: the symbolic factorisation is done once per pattern and reused.
 
+pub mod cholesky_f32;
 pub mod dissection;
 pub mod inertia;
-pub mod rough;
-pub mod zone;
+pub mod schur;
 
 use crate::error::{Error, Result};
 use crate::operator::sparse::Sparse;

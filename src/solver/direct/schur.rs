@@ -8,7 +8,7 @@ use faer::linalg::triangular_solve::{
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 /// The Schur complement S of a factorised matrix on `size` rows, kept as its dense Cholesky factor.
-pub struct Zone {
+pub struct SchurComplement {
     factor: Mat<f64>,
 }
 
@@ -19,10 +19,10 @@ pub struct ZoneInfo {
     pub converged: bool,
 }
 
-impl Zone {
+impl SchurComplement {
     /// From the factor's corner, see [`DirectLlt::corner`](crate::solver::direct::DirectLlt::corner).
     pub fn new(corner: &[f64], size: usize) -> Self {
-        Zone {
+        SchurComplement {
             factor: MatRef::from_column_major_slice(corner, size, size).to_owned(),
         }
     }
@@ -150,7 +150,7 @@ mod tests {
             1 => -1.0,
             _ => 0.0,
         });
-        let mut zone = Zone {
+        let mut zone = SchurComplement {
             factor: s.llt(faer::Side::Lower).unwrap().L().to_owned(),
         };
         let cut = |x: &[f64], y: &mut [f64]| {

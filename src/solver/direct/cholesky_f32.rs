@@ -9,7 +9,7 @@ use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky};
 use faer::{Conj, MatMut, Par};
 
 /// An approximate inverse of a symmetric positive definite matrix.
-pub struct RoughLlt {
+pub struct SingleCholesky {
     symbolic: SymbolicCholesky<u32>,
     numeric: Vec<f32>,
     /// `1/√a_ii`.
@@ -18,12 +18,12 @@ pub struct RoughLlt {
     x: Vec<f32>,
 }
 
-impl RoughLlt {
+impl SingleCholesky {
     /// `order[k]` is the row eliminated `k`-th.
     pub fn new(a: &Sparse, order: &[usize]) -> Result<Self> {
         let symbolic = symbolic_cholesky(a, order)?;
         let scratch = symbolic.solve_in_place_scratch::<f32>(1, Par::Seq);
-        Ok(RoughLlt {
+        Ok(SingleCholesky {
             symbolic,
             numeric: Vec::new(),
             scale: Vec::new(),
@@ -45,7 +45,7 @@ impl RoughLlt {
     /// `A x ≈ b` in place.
     ///
     /// # Panics
-    /// Before the first [`RoughLlt::factorize`].
+    /// Before the first [`SingleCholesky::factorize`].
     pub fn solve(&mut self, x: &mut [f64]) {
         assert!(!self.numeric.is_empty(), "factorised first");
         let scaled = || x.iter().zip(&self.scale).map(|(x, s)| x * s);

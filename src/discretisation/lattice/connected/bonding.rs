@@ -1,7 +1,7 @@
 //! Owns the making of bonds between pieces of bone that touch.
 
 use super::touching::Touching;
-use super::{Bonds, Piece};
+use super::{Bonds, Component};
 use crate::discretisation::lattice::placement::Frame;
 use rayon::prelude::*;
 
@@ -11,11 +11,11 @@ const LEAST_SHARE: f32 = 1e-4;
 /// What bonds are made from.
 pub struct Bonding<'a> {
     pub frame: &'a Frame,
-    pub pieces: &'a [Piece],
+    pub pieces: &'a [Component],
     pub touching: &'a Touching,
 }
 
-/// Pieces whose bonds a task makes at once.
+/// ConnectedSites whose bonds a task makes at once.
 const PORTION: usize = 4096;
 
 impl Bonding<'_> {

@@ -92,7 +92,7 @@ impl Bonds {
 
 /// The pieces that carry load, in the order of their cells.
 #[derive(Debug, Clone)]
-pub struct Pieces {
+pub struct ConnectedSites {
     pub frame: Frame,
     /// Grid indices of each piece's cell.
     pub indices: Vec<[i32; 3]>,
@@ -100,12 +100,12 @@ pub struct Pieces {
     pub fractions: Vec<f32>,
     pub bonds: Bonds,
     pub grips: Grips,
-    /// Pieces without a path of bonds to both grips.
+    /// ConnectedSites without a path of bonds to both grips.
     pub dropped: usize,
 }
 
 /// A piece while the lattice is put together.
-struct Piece {
+struct Component {
     /// Candidate of the frame.
     cell: u32,
     fraction: f32,
@@ -113,7 +113,7 @@ struct Piece {
     ends: [[f32; 2]; 3],
 }
 
-impl Pieces {
+impl ConnectedSites {
     /// Builds the lattice of simple cubic `frame`, keeping what has a path of bonds to both grips.
     pub fn connect(frame: Frame, bone: &Volume<u8>, grips: Grips) -> Self {
         let (pieces, touching) = touching::find(&frame, bone);
@@ -132,7 +132,7 @@ impl Pieces {
         if kept.len() < pieces.len() {
             bonds.keep(&kept);
         }
-        Pieces {
+        ConnectedSites {
             indices: kept
                 .iter()
                 .map(|&p| frame.indices(pieces[p].cell as usize))
@@ -172,7 +172,12 @@ mod tests {
     use crate::discretisation::lattice::stencil::Structure;
     use crate::grid::{Axis, Grid};
 
-    fn connect(n: [usize; 3], h: f64, lp: f64, bone: impl Fn([usize; 3]) -> bool) -> Pieces {
+    fn connect(
+        n: [usize; 3],
+        h: f64,
+        lp: f64,
+        bone: impl Fn([usize; 3]) -> bool,
+    ) -> ConnectedSites {
         let grid = Grid::new(n, [h; 3]);
         let at = |i: usize| [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
         let voxels = (0..grid.len()).map(|i| u8::from(bone(at(i)))).collect();
@@ -187,7 +192,7 @@ mod tests {
         )
         .unwrap();
         let grips = Grips::new(&frame, grid.size_mm()[2], 0.0).unwrap();
-        Pieces::connect(frame, &bone, grips)
+        ConnectedSites::connect(frame, &bone, grips)
     }
 
     #[test]

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Where the points of a scene are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outline {
+pub enum Geometry {
     /// Centred on the origin; the edges must be whole numbers of cells.
     Rectangle(Rectangle),
     /// The cells whose centre is nearer than `radius`; a cell corner sits on `centre`.
@@ -78,14 +78,14 @@ pub struct Slice {
     pub grey: Option<PathBuf>,
 }
 
-/// Pixels read for [`Outline::Image`] or [`Outline::Slice`]: rows from the bottom up, x fastest.
+/// Pixels read for [`Geometry::Image`] or [`Geometry::Slice`]: rows from the bottom up, x fastest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bitmap {
     pub n: [usize; 2],
     pub inside: Vec<bool>,
 }
 
-impl Outline {
+impl Geometry {
     /// The points inside, on a grid of `spacing`. `bitmap` holds the pixels of an image or slice.
     pub fn points(&self, spacing: f64, bitmap: Option<&Bitmap>) -> Result<Points> {
         if !(spacing.is_finite() && spacing > 0.0) {
@@ -96,10 +96,10 @@ impl Outline {
             ));
         }
         match self {
-            Outline::Rectangle(shape) => shape.points(spacing),
-            Outline::Disc(shape) => shape.points(spacing),
-            Outline::Polygon(shape) => shape.points(spacing),
-            Outline::Image(shape) => {
+            Geometry::Rectangle(shape) => shape.points(spacing),
+            Geometry::Disc(shape) => shape.points(spacing),
+            Geometry::Polygon(shape) => shape.points(spacing),
+            Geometry::Image(shape) => {
                 if let Some(wrong) = shape.origin.iter().find(|v| !v.is_finite()) {
                     return Err(Error::setting(
                         "geometry.image.origin",
@@ -109,7 +109,7 @@ impl Outline {
                 }
                 bitmap_points(shape.origin, spacing, bitmap)
             }
-            Outline::Slice(_) => bitmap_points([0.0; 2], spacing, bitmap),
+            Geometry::Slice(_) => bitmap_points([0.0; 2], spacing, bitmap),
         }
     }
 }
@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn disc_counts_are_the_papers() {
         for (n, count) in [(100.0, 31428), (60.0, 11304), (30.0, 2828)] {
-            let disc = Outline::Disc(Disc {
+            let disc = Geometry::Disc(Disc {
                 centre: [0.0; 2],
                 radius: 1.0,
             });
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn rectangles_refuse_broken_cells() {
-        let shape = |size, nodal| Outline::Rectangle(Rectangle { size, nodal });
+        let shape = |size, nodal| Geometry::Rectangle(Rectangle { size, nodal });
         assert_eq!(
             shape([1.0, 0.5], false).points(0.1, None).unwrap().len(),
             50
@@ -291,7 +291,7 @@ mod tests {
             file: None,
         };
         assert_eq!(ring.area(), 3.0);
-        let points = Outline::Polygon(ring).points(0.1, None).unwrap();
+        let points = Geometry::Polygon(ring).points(0.1, None).unwrap();
         // 400 cells, less 100 in the square hole, less the one at (0.75, 0.75) and its 4 neighbours at 0.1.
         assert_eq!(points.len(), 400 - 100 - 5);
     }

@@ -12,7 +12,7 @@ use crate::mask::resample;
 use crate::pipeline::apparent::bricks::LEAST_FRACTION;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::{Conditions, Load, Method, SolveParams};
-use crate::pipeline::lattice::{Case, build_of, build_pieces};
+use crate::pipeline::lattice::{Case, build_connected, build_of};
 use crate::solver::amg::AmgParams;
 use crate::volume::{Specimen, Volume};
 use rayon::prelude::*;
@@ -41,8 +41,8 @@ const BOX: usize = 5;
 /// # Errors
 /// Settings that do not fit the specimen.
 pub fn of_lattice(specimen: &Specimen, case: &Case, params: &SolveParams) -> Result<f64> {
-    if case.in_pieces() {
-        let pieces = build_pieces(specimen, case, params.axis, params.grip_mm)?;
+    if case.is_connected() {
+        let pieces = build_connected(specimen, case, params.axis, params.grip_mm)?;
         return Ok(pieces.len() as f64 * PIECE);
     }
     let tissue = Tissue::of(specimen, params)?;

@@ -1,7 +1,7 @@
 //! Owns which pieces of bone touch across the faces of their cells, found slab by slab of the lattice: the cells of two
 //! slabs at a time, whose voxels' labels are the most that is kept of any, are all there are.
 
-use super::Piece;
+use super::Component;
 use super::cell::{Cell, NO_PIECE};
 use crate::discretisation::lattice::placement::Frame;
 use crate::volume::Volume;
@@ -57,7 +57,7 @@ struct Slab {
 }
 
 /// All pieces that are large enough, in the order of their cells, and which of them touch.
-pub fn find(frame: &Frame, bone: &Volume<u8>) -> (Vec<Piece>, Touching) {
+pub fn find(frame: &Frame, bone: &Volume<u8>) -> (Vec<Component>, Touching) {
     let size = frame.n[0] * frame.n[1];
     let mut pieces = Vec::new();
     let mut links: [Vec<[u32; 2]>; 3] = Default::default();
@@ -91,14 +91,14 @@ pub fn find(frame: &Frame, bone: &Volume<u8>) -> (Vec<Piece>, Touching) {
 }
 
 /// Numbers the pieces of a slab's cells, whose first candidate is `first`, on from those there are.
-fn number(cells: &[Option<Box<Cell>>], first: usize, pieces: &mut Vec<Piece>) -> Vec<Vec<u32>> {
+fn number(cells: &[Option<Box<Cell>>], first: usize, pieces: &mut Vec<Component>) -> Vec<Vec<u32>> {
     let mut of_cell = |(c, cell): (usize, &Option<Box<Cell>>)| {
         let found = cell.iter().flat_map(|cell| &cell.pieces);
         let number = |part: &super::cell::Part| {
             if part.fraction <= LEAST_FRACTION {
                 return NO_SITE;
             }
-            pieces.push(Piece {
+            pieces.push(Component {
                 cell: (first + c) as u32,
                 fraction: part.fraction,
                 ends: part.ends,

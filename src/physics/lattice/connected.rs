@@ -5,7 +5,7 @@
 //! negative where the uniform one is not (`k_s + N_s T >= 0`), whatever the shares.
 
 use super::{Moduli, Virial};
-use crate::discretisation::lattice::pieces::Pieces;
+use crate::discretisation::lattice::connected::ConnectedSites;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::operator::{MixedPrecision, Operator};
 use crate::par::each_chunk;
@@ -29,16 +29,16 @@ struct Direction {
 }
 
 /// The linearised graded lattice as an operator: `K u` is the gradient of the energy. N and mm.
-pub struct GradedLattice<'a> {
-    pieces: &'a Pieces,
+pub struct ConnectedLattice<'a> {
+    pieces: &'a ConnectedSites,
     moduli: Moduli,
     directions: Vec<Direction>,
     /// `T N_s / Σ σ` of each site and shell; empty at ν = ¼, where no volumetric pass is made.
     volumetric: Vec<[f64; 2]>,
 }
 
-impl<'a> GradedLattice<'a> {
-    pub fn new(pieces: &'a Pieces, moduli: Moduli) -> Self {
+impl<'a> ConnectedLattice<'a> {
+    pub fn new(pieces: &'a ConnectedSites, moduli: Moduli) -> Self {
         let stencil = pieces.frame.structure.stencil();
         let direction = |b: usize| {
             let d = stencil.direction(b).map(f64::from);
@@ -71,7 +71,7 @@ impl<'a> GradedLattice<'a> {
             [of(0), of(1)]
         };
         let sites = if moduli.t == 0.0 { 0 } else { pieces.len() };
-        GradedLattice {
+        ConnectedLattice {
             volumetric: (0..sites).into_par_iter().map(coefficients).collect(),
             pieces,
             moduli,
@@ -150,7 +150,7 @@ impl<'a> GradedLattice<'a> {
     }
 }
 
-impl Virial for GradedLattice<'_> {
+impl Virial for ConnectedLattice<'_> {
     fn virial<S: Copy + Into<f64>>(
         &self,
         u: &[[S; 3]],
@@ -162,7 +162,7 @@ impl Virial for GradedLattice<'_> {
     }
 }
 
-impl GradedLattice<'_> {
+impl ConnectedLattice<'_> {
     fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> f64 {
         let (axis, grips) = (self.pieces.frame.axis.index(), self.pieces.grips);
         let plane = self.pieces.indices[site][axis];
@@ -185,7 +185,7 @@ impl GradedLattice<'_> {
     }
 }
 
-impl Operator<3> for GradedLattice<'_> {
+impl Operator<3> for ConnectedLattice<'_> {
     fn sites(&self) -> usize {
         self.pieces.len()
     }
@@ -219,7 +219,7 @@ impl Operator<3> for GradedLattice<'_> {
     }
 }
 
-impl MixedPrecision for GradedLattice<'_> {
+impl MixedPrecision for ConnectedLattice<'_> {
     fn apply_single(
         &self,
         x: &[[f32; 3]],
@@ -252,9 +252,9 @@ impl MixedPrecision for GradedLattice<'_> {
 }
 
 /// What multigrid sees of a graded lattice: its springs.
-pub struct GradedSprings<'a>(pub &'a GradedLattice<'a>);
+pub struct ConnectedSprings<'a>(pub &'a ConnectedLattice<'a>);
 
-impl GradedSprings<'_> {
+impl ConnectedSprings<'_> {
     /// Neighbour and spring of each bond of a site.
     fn springs(&self, site: usize) -> impl Iterator<Item = (usize, [f64; 3], f64)> + '_ {
         let bonds = self.0.pieces.bonds.of(site);
@@ -265,7 +265,7 @@ impl GradedSprings<'_> {
     }
 }
 
-impl Operator<3> for GradedSprings<'_> {
+impl Operator<3> for ConnectedSprings<'_> {
     fn sites(&self) -> usize {
         self.0.sites()
     }
@@ -287,9 +287,9 @@ impl Operator<3> for GradedSprings<'_> {
     }
 }
 
-impl Coarsen for GradedSprings<'_> {
+impl Coarsen for ConnectedSprings<'_> {
     fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
-        let Pieces { frame, indices, .. } = self.0.pieces;
+        let ConnectedSites { frame, indices, .. } = self.0.pieces;
         for (x, at) in x.iter_mut().zip(&indices[sites]) {
             *x = frame.position_mm(*at);
         }

@@ -7,6 +7,7 @@ use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
 use bonepd_ct::pipeline::apparent::solved::Solved;
 use bonepd_ct::pipeline::apparent::{Load, SolveParams};
 use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build};
+use bonepd_ct::result::settings::BoundaryRule;
 use bonepd_ct::volume::{Specimen, Volume};
 
 /// Two slanted struts with a plate between them: 24³ voxels of 0.05 mm.
@@ -193,16 +194,16 @@ fn the_real_stack_gives_the_reference_moduli() {
     ];
     for (lp, floppy_mpa, floppy_sites, firm_mpa, firm_sites) in reference {
         for (boundary, e_app, sites) in [
-            ("floppy", floppy_mpa, floppy_sites),
-            ("firm", firm_mpa, firm_sites),
+            (BoundaryRule::FLOPPY, floppy_mpa, floppy_sites),
+            (BoundaryRule::FIRM, firm_mpa, firm_sites),
         ] {
             let is_it = |r: &&bonepd_ct::result::row::Row| {
-                r.boundary.as_deref() == Some(boundary) && r.lp_mm == lp
+                r.key.boundary == Some(boundary) && r.key.lp_mm == lp
             };
             let row = rows.iter().find(is_it).unwrap();
-            assert_eq!(row.sites, Some(sites));
+            assert_eq!(row.solved.as_ref().unwrap().sites, Some(sites));
             assert!(
-                (row.e_app_mpa.unwrap() / e_app - 1.0).abs() < 0.01,
+                (row.e_app_mpa().unwrap() / e_app - 1.0).abs() < 0.01,
                 "{row:?}"
             );
         }

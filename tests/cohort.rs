@@ -1,10 +1,11 @@
 //! `run` through the built program: isolation of failures, resuming, killing, manifests, recipes.
 
 use crate::cli::{bonepd, run};
-use bonepd_ct::grid::Grid;
+use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::image::nifti;
 use bonepd_ct::io::table;
 use bonepd_ct::result::row::Row;
+use bonepd_ct::result::settings::{BoundaryRule, Method};
 use bonepd_ct::volume::Volume;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -82,7 +83,7 @@ fn a_bad_scan_is_named_and_the_others_finish() {
     assert!(
         rows(&out)
             .iter()
-            .all(|row| row.e_app_mpa.is_some_and(|e| e > 0.0))
+            .all(|row| row.e_app_mpa().is_some_and(|e| e > 0.0))
     );
     for file in [
         "report/report.md",
@@ -124,8 +125,8 @@ fn what_is_up_to_date_is_kept_and_what_changed_is_redone() {
     let floppy = |rows: &[Row]| -> Vec<Option<f64>> {
         let own = rows
             .iter()
-            .filter(|row| row.boundary.as_deref() == Some("floppy"));
-        own.map(|row| row.e_app_mpa).collect()
+            .filter(|row| row.key.boundary == Some(BoundaryRule::FLOPPY));
+        own.map(Row::e_app_mpa).collect()
     };
     assert_ne!(floppy(&third[6..]), floppy(&first[6..]));
 }
@@ -231,20 +232,32 @@ fn a_manifest_names_scans_groups_and_settings() {
     assert_eq!(code, 0, "{stderr}");
     let rows = rows(&out);
     assert!(scans.is_dir() && rows.len() == 12);
-    let facts = |row: &Row| (row.scan.clone(), row.group.clone(), row.voxel_mm.clone());
+    let facts = |row: &Row| {
+        (
+            row.key.scan.clone(),
+            row.marks.group.clone(),
+            row.key.voxel_mm,
+        )
+    };
     assert_eq!(
         facts(&rows[0]),
-        ("left".into(), Some("OA".into()), "0.06".into())
+        ("left".into(), Some("OA".into()), [0.06; 3])
     );
-    assert_eq!(facts(&rows[11]), ("right".into(), None, "0.05".into()));
-    assert!(rows.iter().all(|row| row.subject.as_deref() == Some("p1")));
+    assert_eq!(facts(&rows[11]), ("right".into(), None, [0.05; 3]));
+    assert!(
+        rows.iter()
+            .all(|row| row.marks.subject.as_deref() == Some("p1"))
+    );
     // A later solve in a scan's folder belongs to the same group.
     let left = out.join("left");
     let args = ["solve", text(&left), "--lp", "0.3", "--boundary", "floppy"];
     assert_eq!(run(&args).0, 0);
     let own: Vec<Row> = table::read(&left.join("results.csv")).unwrap();
     assert_eq!(own.len(), 7);
-    assert!(own.iter().all(|row| row.group.as_deref() == Some("OA")));
+    assert!(
+        own.iter()
+            .all(|row| row.marks.group.as_deref() == Some("OA"))
+    );
 }
 
 #[test]
@@ -316,7 +329,7 @@ fn a_setting_on_the_command_line_wins_over_the_recipe() {
     assert_eq!(run(&args).0, 0);
     let rows = rows(&out);
     assert_eq!(rows.len(), 1);
-    assert_eq!((rows[0].lp_mm, rows[0].axis.as_str()), (0.3, "x"));
+    assert_eq!((rows[0].key.lp_mm, rows[0].key.axis), (0.3, Axis::X));
 }
 
 #[test]
@@ -389,11 +402,11 @@ fn a_structure_that_does_not_connect_the_faces_has_modulus_zero() {
     let (code, _, stderr) = run(&args);
     assert_eq!(code, 0, "{stderr}");
     let rows = rows(&out);
-    assert_eq!(rows[0].e_app_mpa, Some(0.0));
+    assert_eq!(rows[0].e_app_mpa(), Some(0.0));
     assert!(
-        rows[0].note.as_ref().unwrap().contains("no path"),
+        rows[0].marks.note.as_ref().unwrap().contains("no path"),
         "{:?}",
-        rows[0].note
+        rows[0].marks.note
     );
 }
 
@@ -405,7 +418,7 @@ fn a_solve_that_stops_early_exits_1_and_marks_its_row() {
     let (code, _, stderr) = run(&["run", text(&recipe), text(&scans), "-o", text(&out)]);
     assert_eq!(code, 1);
     assert!(stderr.contains("not converged"), "{stderr}");
-    assert!(rows(&out).iter().any(|row| row.converged == Some(false)));
+    assert!(rows(&out).iter().any(|row| row.converged() == Some(false)));
     let report = fs::read_to_string(out.join("report/report.md")).unwrap();
     assert!(report.contains("not converged"), "{report}");
 }
@@ -432,10 +445,10 @@ fn morphometry_stands_beside_the_modulus() {
     let out = dir.path().join("out");
     let words = ["run", text(&recipe), text(&scans), "-o", text(&out)];
     assert_eq!(run(&words).0, 0);
-    assert!(rows(&out).iter().all(|row| row.tb_th_mm.is_none()));
+    assert!(rows(&out).iter().all(|row| row.marks.tb_th_mm.is_none()));
     let measured = [&words[..], &["--morphometry"]].concat();
     assert_eq!(run(&measured).0, 0);
-    for row in rows(&out) {
+    for row in rows(&out).iter().map(|row| &row.marks) {
         assert!(
             row.tb_th_mm.unwrap() > 0.05 && row.tb_sp_mm.unwrap() > 0.05,
             "{row:?}"
@@ -465,7 +478,7 @@ fn a_stated_error_leaves_no_row_twice() {
     ];
     assert!(run(&words).0 <= 1);
     let rows = rows(&out);
-    assert!(rows.iter().any(|row| row.method == "voxel-fe"));
+    assert!(rows.iter().any(|row| row.key.method == Method::VoxelFe));
     for (at, row) in rows.iter().enumerate() {
         assert!(!rows[..at].contains(row), "{row:?}");
     }
@@ -504,7 +517,7 @@ fn results_that_no_longer_hold_are_set_aside() {
     assert_eq!(there(&two), [false, true]);
     // Nor do they come back with the next scan that is run alone.
     assert_eq!(run(&[&words[..], &["--only", "s1"]].concat()).0, 0);
-    assert!(rows(&out).iter().all(|row| row.scan == "s1"));
+    assert!(rows(&out).iter().all(|row| row.key.scan == "s1"));
     // Nothing is left to show.
     fs::write(&scan_1, "no image").unwrap();
     assert_eq!(run(&words).0, 1);

@@ -205,7 +205,7 @@ fn fields_are_written_on_the_scans_grid() {
     assert!(String::from_utf8_lossy(&vti).contains("Origin=\"2.99 -2.01 0.99\""));
     assert!(said.contains("failure load 0.067 N"), "{said}");
     let rows: Vec<Row> = table::read(&dir.path().join("out/results.csv")).unwrap();
-    let load = rows[0].failure_load_n.unwrap();
+    let load = rows[0].solved.as_ref().unwrap().failure.unwrap().load_n;
     assert!((load / (7.0 * 0.12 * 0.08) - 1.0).abs() < 1e-2, "{load}");
     let (code, _, stderr) = run(&["solve", &out, "--fields", "sed,von-mises"]);
     assert!(code == 2 && stderr.contains("voxel-fe"), "{stderr}");

@@ -3,6 +3,7 @@
 use crate::cli::run;
 use crate::cohort::{cohort, rows, text};
 use bonepd_ct::result::row::Row;
+use bonepd_ct::result::settings::BoundaryRule;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -38,7 +39,11 @@ fn a_scan_solved_again_after_the_run_is_read_from_its_own_folder() {
     assert_eq!(run(&more).0, 0);
     let (after, found) = report_of(&out);
     assert_eq!(found.len(), rows(&out).len() + 1);
-    assert!(found.windows(2).all(|two| two[0].scan <= two[1].scan));
+    assert!(
+        found
+            .windows(2)
+            .all(|two| two[0].key.scan <= two[1].key.scan)
+    );
     // The one solve more takes nothing from the statistics, and is named.
     let statistics = |page: &str| {
         let (_, from) = page.split_once("## Statistics").unwrap();
@@ -71,8 +76,8 @@ fn a_mean_of_what_is_not_converged_is_not_compared() {
     let means: Vec<Row> = rows(&out);
     let means = means
         .iter()
-        .filter(|row| row.boundary.as_deref() == Some("ffb"));
-    assert!(means.clone().count() == 6 && means.clone().all(|row| row.converged == Some(false)));
+        .filter(|row| row.key.boundary == Some(BoundaryRule::Ffb));
+    assert!(means.clone().count() == 6 && means.clone().all(|row| row.converged() == Some(false)));
     let (page, _) = report_of(&out);
     assert!(!page.contains("## Statistics"), "{page}");
 }
@@ -81,15 +86,15 @@ fn a_mean_of_what_is_not_converged_is_not_compared() {
 fn an_error_that_is_not_met_stands_in_the_rows() {
     let (_dir, out) = solved(1, &["--error", "0.05%"]);
     let own = out.join("s1");
-    let noted = |rows: Vec<Row>, percent: &str| -> Vec<Option<String>> {
+    let noted = |rows: Vec<Row>, percent: &str| -> Vec<Option<BoundaryRule>> {
         let words = format!("the error asked for, {percent} %, is not met");
         let about = rows
             .into_iter()
-            .filter(|row| row.note.as_ref().is_some_and(|n| n.contains(&words)));
-        about.map(|row| row.boundary).collect()
+            .filter(|row| row.marks.note.as_ref().is_some_and(|n| n.contains(&words)));
+        about.map(|row| row.key.boundary).collect()
     };
     // The finest solve and the limit it leads to, in the table of the run and of the scan.
-    let both = [None, Some("extrapolated".to_owned())];
+    let both = [None, Some(BoundaryRule::Extrapolated)];
     assert_eq!(noted(rows(&out), "0.05"), both);
     assert_eq!(noted(rows(&own), "0.05"), both);
     assert!(report_of(&out).0.contains("the error asked for, 0.05 %"));
@@ -99,7 +104,12 @@ fn an_error_that_is_not_met_stands_in_the_rows() {
     assert_eq!(noted(rows(&own), "0.05"), []);
     // Redone, all its resolutions are there: no step drops what another solved.
     let solved = |rows: Vec<Row>| -> BTreeSet<String> {
-        let name = |row: Row| format!("{} {} {:?}", row.method, row.lp_mm, row.boundary);
+        let name = |row: Row| {
+            format!(
+                "{:?} {} {:?}",
+                row.key.method, row.key.lp_mm, row.key.boundary
+            )
+        };
         rows.into_iter().map(name).collect()
     };
     let before = solved(rows(&own));

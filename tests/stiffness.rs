@@ -230,7 +230,7 @@ fn the_file_is_read_back_kept_and_made_again() {
     assert_eq!(code, 0, "{stderr}");
     let rows: Vec<bonepd_ct::result::row::Row> = serde_json::from_str(&stdout).unwrap();
     assert_eq!(
-        (rows[0].load.as_str(), rows[0].ends.as_str()),
+        (rows[0].key.load.name(), rows[0].key.supports.name()),
         ("stiffness", "kinematic")
     );
     let path = std::path::Path::new(out).join("stiffness.json");
@@ -238,8 +238,8 @@ fn the_file_is_read_back_kept_and_made_again() {
     // What a scene reads is what was written.
     assert_eq!(file::read(&path).unwrap(), record.stiffness_mpa);
     let s = compliance(&record.stiffness_mpa).unwrap();
-    assert!((rows[0].e_app_mpa.unwrap() * s[2][2] - 1.0).abs() < 1e-9);
-    assert!(rows[0].note.as_ref().unwrap().contains("kinematic"));
+    assert!((rows[0].e_app_mpa().unwrap() * s[2][2] - 1.0).abs() < 1e-9);
+    assert!(rows[0].marks.note.as_ref().unwrap().contains("kinematic"));
     // Kept while it is there, made again when it is not, or other conditions are asked for.
     let made = |args: &[&str]| {
         let before = std::fs::metadata(&path)

@@ -249,17 +249,20 @@ fn a_labelled_scan_goes_through_the_commands() {
         "1e-7",
     ]);
     let rows: Vec<Row> = table::read(&dir.path().join("out/results.csv")).unwrap();
-    assert_eq!(rows[0].material.as_deref(), Some("labels:100=500;127=2000"));
-    assert_eq!(rows[0].young_mpa, 1250.0);
-    assert!((rows[0].bv_tv - 0.8).abs() < 1e-12);
+    assert_eq!(
+        rows[0].key.material.as_deref(),
+        Some("labels:100=500;127=2000")
+    );
+    assert_eq!(rows[0].key.young_mpa, 1250.0);
+    assert!((rows[0].key.bv_tv - 0.8).abs() < 1e-12);
     // Layers in series over 0.8 of the section.
-    assert!((rows[0].e_app_mpa.unwrap() / 640.0 - 1.0).abs() < 1e-5);
+    assert!((rows[0].e_app_mpa().unwrap() / 640.0 - 1.0).abs() < 1e-5);
     let recipe = "[segment]\nlabels = [100, 127]\n[solve]\nmethod = \"voxel-fe\"\npoisson = 0.0\n[solve.material.law]\n\
         labels = [{ value = 100, young_mpa = 500 }, { value = 127, young_mpa = 2000 }]\n";
     std::fs::write(dir.path().join("r.toml"), recipe).unwrap();
     ok(&["run", &at("r.toml"), &scan, "-o", &at("cohort")]);
     let again: Vec<Row> = table::read(&dir.path().join("cohort/results.csv")).unwrap();
-    assert!((again[0].e_app_mpa.unwrap() / 640.0 - 1.0).abs() < 2e-3);
+    assert!((again[0].e_app_mpa().unwrap() / 640.0 - 1.0).abs() < 2e-3);
     let (code, _, stderr) = run(&["segment", &scan, "-o", &out, "--labels", "99"]);
     assert!(code == 2 && stderr.contains("127"), "{stderr}");
 }

@@ -144,7 +144,7 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
         print_json(&rows);
     }
     Ok(
-        match !met || rows.iter().any(|row| row.converged == Some(false)) {
+        match !met || rows.iter().any(|row| row.converged() == Some(false)) {
             true => Outcome::NotConverged,
             false => Outcome::Done,
         },

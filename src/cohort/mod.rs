@@ -19,6 +19,7 @@ use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::results::Results;
 use crate::result::row::Row;
+use crate::result::settings::BoundaryRule;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -232,8 +233,8 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
         None => solve::solve(dir, &recipe.lattice, &recipe.solve, session)?,
     };
     for row in &mut rows {
-        row.group.clone_from(&job.group);
-        row.subject.clone_from(&job.subject);
+        row.marks.group.clone_from(&job.group);
+        row.marks.subject.clone_from(&job.subject);
     }
     Results::open(dir, false)?.label(&job.group, &job.subject)?;
     Ok(rows)
@@ -253,15 +254,16 @@ fn failures(jobs: &[ScanJob], done: &[Option<Result<Vec<Row>>>]) -> Vec<Failure>
 
 /// How many rows, and the modulus of the last: the mean or the limit of the finest lattices, where there are several.
 fn in_words(rows: &[Row]) -> String {
-    let stalled = rows.iter().filter(|row| row.converged == Some(false));
+    let stalled = rows.iter().filter(|row| row.converged() == Some(false));
     let stalled = match stalled.count() {
         0 => String::new(),
         n => format!(", {n} not converged"),
     };
     let modulus = rows.last().and_then(|row| {
-        let kind = row.boundary.as_deref().unwrap_or(&row.method);
-        let e_app = row.e_app_mpa?;
-        Some(format!("; {kind} {} mm: E_app {e_app:.3} MPa", row.lp_mm))
+        let key = &row.key;
+        let kind = key.boundary.map_or(key.method.name(), BoundaryRule::name);
+        let e_app = row.e_app_mpa()?;
+        Some(format!("; {kind} {} mm: E_app {e_app:.3} MPa", key.lp_mm))
     });
     format!(
         "{} rows{stalled}{}",
@@ -278,12 +280,12 @@ fn result(
     target: Option<f64>,
 ) -> ScanResult {
     let missed = |rows: &[Row]| {
-        let broken = rows.iter().all(|row| row.e_app_mpa == Some(0.0));
+        let broken = rows.iter().all(Row::is_disconnected);
         target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
     };
     let (state, error, rows) = match solved {
         Some(Ok(rows)) if missed(&rows) => ("error not met", None, rows.len()),
-        Some(Ok(rows)) if rows.iter().any(|row| row.converged == Some(false)) => {
+        Some(Ok(rows)) if rows.iter().any(|row| row.converged() == Some(false)) => {
             ("not converged", None, rows.len())
         }
         Some(Ok(rows)) => ("done", None, rows.len()),

@@ -13,7 +13,7 @@ use crate::pipeline::apparent::{Method, SolveParams};
 use crate::pipeline::lattice::{Boundary, LatticeParams, Structure};
 use crate::record::error_target_note::Missed;
 use crate::record::results::Results;
-use crate::result::extrapolate::{EXTRAPOLATED, with_extrapolated};
+use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
 use crate::result::row::Row;
 use std::path::Path;
 
@@ -86,8 +86,7 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
             ..params.clone()
         };
         rows.extend(solve(dir, &lattices, &lattice, session)?);
-        let broken = |r: &Row| r.e_app_mpa == Some(0.0);
-        if !session.dry_run && (meets(&rows, target) || rows.iter().all(broken)) {
+        if !session.dry_run && (meets(&rows, target) || rows.iter().all(Row::is_disconnected)) {
             return finish(dir, rows, target, session);
         }
     }
@@ -139,9 +138,10 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
 
 /// Algebraic and discretisation error of a row together, relative; None where either is not stated.
 fn stated(row: &Row) -> Option<f64> {
-    let error = row.algebraic_error_mpa? + row.discretization_error_mpa?;
-    let limit = row.boundary.as_deref() == Some(EXTRAPOLATED) || row.boundary.is_none();
-    row.e_app_mpa
+    let [algebraic, discretization] = row.stated_errors_mpa();
+    let error = algebraic? + discretization?;
+    let limit = is_extrapolated(row) || row.key.boundary.is_none();
+    row.e_app_mpa()
         .filter(|e| *e > 0.0 && limit)
         .map(|e| error / e)
 }
@@ -169,7 +169,7 @@ fn percent(x: f64) -> String {
 
 /// Says what came of it; where the target is missed, so do the rows, here and in the results.
 fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Result<Found> {
-    if session.dry_run || rows.iter().all(|r| r.e_app_mpa == Some(0.0)) {
+    if session.dry_run || rows.iter().all(Row::is_disconnected) {
         return Ok(Found { rows, met: true });
     }
     let met = meets(&rows, target);

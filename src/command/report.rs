@@ -119,8 +119,8 @@ fn render(report: &Report, session: &Session) -> Result<Vec<(String, Vec<u8>)>> 
 fn pages(rows: &[Row], dirs: &[PathBuf]) -> Vec<ScanPage> {
     let mut pages: Vec<ScanPage> = Vec::new();
     for row in rows {
-        if pages.iter().all(|page| page.scan != row.scan) {
-            pages.push(page(&row.scan, dirs));
+        if pages.iter().all(|page| page.scan != row.key.scan) {
+            pages.push(page(&row.key.scan, dirs));
         }
     }
     pages

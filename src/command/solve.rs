@@ -19,7 +19,8 @@ use crate::record::results::Results;
 use crate::record::specimen;
 use crate::result::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapolated};
 use crate::result::ffb::with_ffb;
-use crate::result::row::Row;
+use crate::result::row::{FailureLoad, Marks, Row};
+use crate::result::settings::{BoundaryRule, CellType, Settings};
 use crate::solver::cg::CgStep;
 use crate::volume::Specimen;
 use indicatif::ProgressBar;
@@ -44,7 +45,7 @@ pub fn solve(
     }
     let specimen = loaded(dir, params)?;
     let tissue = Tissue::of(&specimen, params)?;
-    let settings = tissue.label(params.row(&specimen), params);
+    let settings = tissue.label(params.key(&specimen), params);
     drop(tissue);
     if params.method == Method::Lattice {
         warn_of_coarse(dir, lattices, session);
@@ -54,11 +55,14 @@ pub fn solve(
     let mut results = Results::open(dir, session.force)?;
     let mut rows = Vec::new();
     for job in jobs(lattices, params) {
-        let settings = Row {
-            mean_thickness_mm,
-            ..settings.clone()
+        let blank = Row {
+            key: job.label(&specimen, params, settings.clone()),
+            solved: None,
+            marks: Marks {
+                mean_thickness_mm,
+                ..Marks::default()
+            },
         };
-        let blank = job.label(&specimen, params, settings);
         let kept = results.find(&blank, params);
         let mut row = match kept
             .filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params))
@@ -71,8 +75,8 @@ pub fn solve(
                 let mib = estimate::of_solve_mib(&specimen, job.case(), params)?;
                 session.say(format!(
                     "would solve {} {} mm, about {mib:.0} MiB",
-                    job.name(&blank),
-                    blank.lp_mm
+                    job.name(),
+                    blank.key.lp_mm
                 ));
                 continue;
             }
@@ -138,10 +142,11 @@ fn warn_of_coarse(dir: &Path, lattice: &LatticeParams, session: &Session) {
 
 /// Puts the specimen's morphometry beside its modulus.
 fn mark(row: &mut Row, measured: Option<&Morphometry>) {
-    row.tb_th_mm = measured.and_then(|m| Some(m.tb_th.as_ref()?.mean_mm));
-    row.tb_sp_mm = measured.and_then(|m| Some(m.tb_sp.as_ref()?.mean_mm));
-    row.conn_d_per_mm3 = measured.map(|m| m.conn_d_per_mm3);
-    row.da = measured.and_then(|m| Some(m.fabric.as_ref()?.da));
+    let marks = &mut row.marks;
+    marks.tb_th_mm = measured.and_then(|m| Some(m.tb_th.as_ref()?.mean_mm));
+    marks.tb_sp_mm = measured.and_then(|m| Some(m.tb_sp.as_ref()?.mean_mm));
+    marks.conn_d_per_mm3 = measured.map(|m| m.conn_d_per_mm3);
+    marks.da = measured.and_then(|m| Some(m.fabric.as_ref()?.da));
 }
 
 /// One row to solve.
@@ -159,10 +164,10 @@ fn jobs(lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {
 
 impl Job {
     /// The columns that tell what was solved.
-    fn label(&self, specimen: &Specimen, params: &SolveParams, row: Row) -> Row {
+    fn label(&self, specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings {
         match self {
-            Job::Lattice(case) => lattice::label(row, case),
-            Job::VoxelFe => voxel_fe::label(row, specimen, params),
+            Job::Lattice(case) => lattice::label(key, case),
+            Job::VoxelFe => voxel_fe::label(key, specimen, params),
         }
     }
 
@@ -177,12 +182,21 @@ impl Job {
         matches!(self, Job::VoxelFe) && params.load == Load::Stiffness
     }
 
-    fn name(&self, row: &Row) -> String {
+    fn name(&self) -> String {
         match self {
-            Job::Lattice(case) => format!("{} {}", row.structure, case.boundary.name()),
-            Job::VoxelFe => row.structure.clone(),
+            Job::Lattice(case) => format!("{} {}", case.structure.name(), case.boundary.name()),
+            Job::VoxelFe => CellType::Hex8.name().to_owned(),
         }
     }
+}
+
+/// The row with what its solve took.
+fn metered(mut row: Row, meter: &Meter) -> Row {
+    if let Some(solved) = &mut row.solved {
+        solved.wall_s = Some(meter.wall_s());
+        solved.peak_mib = meter.peak_mib();
+    }
+    row
 }
 
 fn solve_job(
@@ -194,16 +208,12 @@ fn solve_job(
     session: &Session,
 ) -> Result<Row> {
     let meter = Meter::start();
-    let bar = session.bar(1000, &format!("{} {} mm", job.name(blank), blank.lp_mm));
+    let bar = session.bar(1000, &format!("{} {} mm", job.name(), blank.key.lp_mm));
     if job.is_stiffness(params) {
         let observe = |load: usize, step| show_load(&bar, load, step, params.tolerance);
         let row = stiffness::solve(dir, specimen, params, blank, session, observe)?;
         bar.finish_and_clear();
-        return Ok(Row {
-            wall_s: Some(meter.wall_s()),
-            peak_mib: meter.peak_mib(),
-            ..row
-        });
+        return Ok(metered(row, &meter));
     }
     let observe = |step| show(&bar, step, params.tolerance);
     let (solved, recorded) = match job {
@@ -219,15 +229,16 @@ fn solve_job(
     };
     bar.finish_and_clear();
     write_fields(dir, &recorded)?;
-    let row = solved.row(blank.clone());
-    Ok(Row {
-        wall_s: Some(meter.wall_s()),
-        peak_mib: meter.peak_mib(),
-        discretization_error_mpa: voxel_fe_error(&row),
-        failure_load_n: recorded.failure.map(|f| f.load_n),
-        failure_factor: recorded.failure.map(|f| f.factor),
-        ..row
-    })
+    let mut row = solved.row(blank.clone());
+    let discretization_error_mpa = voxel_fe_error(&row);
+    if let Some(solved) = &mut row.solved {
+        solved.discretization_error_mpa = discretization_error_mpa;
+        solved.failure = recorded.failure.map(|f| FailureLoad {
+            load_n: f.load_n,
+            factor: f.factor,
+        });
+    }
+    Ok(metered(row, &meter))
 }
 
 /// `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView.
@@ -264,26 +275,28 @@ fn show_load(bar: &ProgressBar, load: usize, step: CgStep, tolerance: f64) {
 
 pub(super) fn in_words(row: &Row) -> String {
     let number = |v: Option<f64>, digits: usize| v.map_or("NA".into(), |v| format!("{v:.digits$}"));
+    let solved = row.solved.clone().unwrap_or_default();
     let note = row
+        .marks
         .note
         .as_ref()
         .map_or(String::new(), |n| format!("  ({n})"));
-    let discretization = row
+    let discretization = solved
         .discretization_error_mpa
         .map_or(String::new(), |e| format!(" ± {e:.3} (discretisation)"));
-    let failure = row
-        .failure_load_n
-        .map_or(String::new(), |load| format!("  failure load {load:.3} N"));
+    let failure = solved.failure.map_or(String::new(), |failure| {
+        format!("  failure load {:.3} N", failure.load_n)
+    });
     format!(
         "{} {:<8} {:<12} {:>6} mm  E_app {:>9} MPa ± {:<7}{discretization} {:>9} sites {:>6} iterations {:>7} s{failure}{note}",
-        row.scan,
-        row.structure,
-        row.boundary.as_deref().unwrap_or(""),
-        row.lp_mm,
-        number(row.e_app_mpa, 3),
-        number(row.algebraic_error_mpa, 3),
-        row.sites.unwrap_or(0),
-        row.iterations.unwrap_or(0),
-        number(row.wall_s, 2),
+        row.key.scan,
+        row.key.structure.name(),
+        row.key.boundary.map_or("", BoundaryRule::name),
+        row.key.lp_mm,
+        number(solved.e_app_mpa, 3),
+        number(solved.algebraic_error_mpa, 3),
+        solved.sites.unwrap_or(0),
+        solved.iterations.unwrap_or(0),
+        number(solved.wall_s, 2),
     )
 }

@@ -8,7 +8,7 @@ use crate::pipeline::apparent::stiffness::{Stiffness, solve_stiffness};
 use crate::record::specimen::MASK;
 use crate::record::stiffness as file;
 use crate::record::stiffness::StiffnessRecord;
-use crate::result::row::Row;
+use crate::result::row::{Marks, Row, Solution};
 use crate::solver::cg::CgStep;
 use crate::volume::Specimen;
 use std::path::Path;
@@ -75,7 +75,7 @@ fn row(solved: &Stiffness, params: &SolveParams, blank: &Row) -> Row {
     if !solved.ended.converged() {
         note += "; not converged";
     }
-    Row {
+    let solution = Solution {
         sites: Some(solved.elements as u64),
         dropped_sites: Some(solved.dropped as u64),
         unknowns: Some(solved.unknowns as u64),
@@ -84,8 +84,15 @@ fn row(solved: &Stiffness, params: &SolveParams, blank: &Row) -> Row {
         converged: Some(solved.ended.converged()),
         e_app_mpa: Some(e_app),
         algebraic_error_mpa: Some(error),
-        note: Some(note),
-        ..blank.clone()
+        ..Solution::default()
+    };
+    Row {
+        key: blank.key.clone(),
+        solved: Some(solution),
+        marks: Marks {
+            note: Some(note),
+            ..blank.marks.clone()
+        },
     }
 }
 

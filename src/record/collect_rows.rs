@@ -65,27 +65,34 @@ fn newer_in(dir: &Path, file: &Path) -> Vec<(String, PathBuf)> {
 
 /// The scan's rows stand where they stood; those of a scan that had none come last.
 fn replace(rows: &mut Vec<Row>, scan: &str, new: Vec<Row>) {
-    let at = rows.iter().position(|row| row.scan == scan);
+    let at = rows.iter().position(|row| row.key.scan == scan);
     let at = at.unwrap_or(rows.len());
-    rows.retain(|row| row.scan != scan);
+    rows.retain(|row| row.key.scan != scan);
     rows.splice(at..at, new);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::result::settings::Settings;
 
     #[test]
     fn newer_rows_stand_where_the_older_stood() {
         let row = |scan: &str, lp_mm| Row {
-            scan: scan.to_owned(),
-            lp_mm,
+            key: Settings {
+                scan: scan.to_owned(),
+                lp_mm,
+                ..Settings::default()
+            },
             ..Row::default()
         };
         let mut rows = vec![row("a", 1.0), row("b", 1.0), row("b", 2.0), row("c", 1.0)];
         replace(&mut rows, "b", vec![row("b", 3.0)]);
         replace(&mut rows, "d", vec![row("d", 4.0)]);
-        let found: Vec<(&str, f64)> = rows.iter().map(|r| (r.scan.as_str(), r.lp_mm)).collect();
+        let found: Vec<(&str, f64)> = rows
+            .iter()
+            .map(|r| (r.key.scan.as_str(), r.key.lp_mm))
+            .collect();
         assert_eq!(found, [("a", 1.0), ("b", 3.0), ("c", 1.0), ("d", 4.0)]);
     }
 }

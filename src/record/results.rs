@@ -114,7 +114,7 @@ impl Results {
     /// solve.
     pub fn find(&self, blank: &Row, params: &SolveParams) -> Option<Row> {
         let key = Some(key(blank, params));
-        let same = |old: &&KeyedRow| old.key == key && old.row.converged == Some(true);
+        let same = |old: &&KeyedRow| old.key == key && old.row.converged() == Some(true);
         self.record
             .rows
             .iter()
@@ -130,7 +130,8 @@ impl Results {
             settings: Some(params.clone()),
         };
         if let Some(KeyedRow { row: old, .. }) = self.record.rows.first() {
-            (new.row.group, new.row.subject) = (old.group.clone(), old.subject.clone());
+            (new.row.marks.group, new.row.marks.subject) =
+                (old.marks.group.clone(), old.marks.subject.clone());
         }
         match self.record.rows.iter_mut().find(|old| old.key == new.key) {
             Some(old) => *old = new,
@@ -143,8 +144,9 @@ impl Results {
     pub fn label(&mut self, group: &Option<String>, subject: &Option<String>) -> Result<()> {
         let mut changed = false;
         for KeyedRow { row, .. } in &mut self.record.rows {
-            if row.group != *group || row.subject != *subject {
-                (row.group, row.subject) = (group.clone(), subject.clone());
+            let marks = &mut row.marks;
+            if marks.group != *group || marks.subject != *subject {
+                (marks.group, marks.subject) = (group.clone(), subject.clone());
                 changed = true;
             }
         }
@@ -181,13 +183,13 @@ impl Results {
             .collect();
         let rows = with_extrapolated(&with_ffb(&solved));
         let mut solved = self.record.rows.iter();
-        let keyed = |row: &Row| match row.boundary.as_deref() {
-            Some("ffb" | "extrapolated") => KeyedRow {
+        let keyed = |row: &Row| match row.key.is_derived() {
+            true => KeyedRow {
                 row: row.clone(),
                 key: None,
                 settings: None,
             },
-            _ => solved
+            false => solved
                 .next()
                 .expect("means are added, nothing is removed")
                 .clone(),
@@ -242,18 +244,29 @@ fn key(blank: &Row, params: &SolveParams) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::result::row::Solution;
+    use crate::result::settings::{BoundaryRule, Settings};
 
-    fn blank(boundary: &str) -> Row {
+    const FIRM: BoundaryRule = BoundaryRule::FIRM;
+    const FLOPPY: BoundaryRule = BoundaryRule::FLOPPY;
+
+    fn blank(boundary: BoundaryRule) -> Row {
         Row {
-            boundary: Some(boundary.to_owned()),
+            key: Settings {
+                boundary: Some(boundary),
+                ..Settings::default()
+            },
             ..Row::default()
         }
     }
 
-    fn solved(boundary: &str, e: f64) -> Row {
+    fn solved(boundary: BoundaryRule, e: f64) -> Row {
         Row {
-            e_app_mpa: Some(e),
-            converged: Some(true),
+            solved: Some(Solution {
+                e_app_mpa: Some(e),
+                converged: Some(true),
+                ..Solution::default()
+            }),
             ..blank(boundary)
         }
     }
@@ -270,37 +283,37 @@ mod tests {
         let params = SolveParams::default();
         let mut results = Results::open(dir.path(), false).unwrap();
         results
-            .keep(&blank("firm"), &params, &solved("firm", 1.0 / 3.0))
+            .keep(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0))
             .unwrap();
         results
-            .keep(&blank("floppy"), &params, &solved("floppy", 0.1))
+            .keep(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1))
             .unwrap();
 
         let again = Results::open(dir.path(), false).unwrap();
         assert_eq!(
-            again.find(&blank("firm"), &params),
-            Some(solved("firm", 1.0 / 3.0))
+            again.find(&blank(FIRM), &params),
+            Some(solved(FIRM, 1.0 / 3.0))
         );
         let tighter = SolveParams {
             tolerance: 1e-6,
             ..params.clone()
         };
-        assert_eq!(again.find(&blank("firm"), &tighter), None);
+        assert_eq!(again.find(&blank(FIRM), &tighter), None);
         let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
         assert_eq!(table.len(), 3);
-        assert_eq!(table[2].boundary.as_deref(), Some("ffb"));
+        assert_eq!(table[2].key.boundary, Some(BoundaryRule::Ffb));
 
         assert_eq!(
             Results::open(dir.path(), true)
                 .unwrap()
-                .find(&blank("firm"), &params),
+                .find(&blank(FIRM), &params),
             None
         );
         std::fs::write(dir.path().join("mask.nii.gz"), "another").unwrap();
         assert_eq!(
             Results::open(dir.path(), false)
                 .unwrap()
-                .find(&blank("firm"), &params),
+                .find(&blank(FIRM), &params),
             None
         );
     }
@@ -310,16 +323,14 @@ mod tests {
         let dir = folder();
         let params = SolveParams::default();
         let mut results = Results::open(dir.path(), false).unwrap();
-        let stalled = Row {
-            converged: Some(false),
-            ..solved("firm", 2.0)
-        };
-        results.keep(&blank("firm"), &params, &stalled).unwrap();
-        assert_eq!(results.find(&blank("firm"), &params), None);
+        let mut stalled = solved(FIRM, 2.0);
+        stalled.solved.as_mut().unwrap().converged = Some(false);
+        results.keep(&blank(FIRM), &params, &stalled).unwrap();
+        assert_eq!(results.find(&blank(FIRM), &params), None);
         results
-            .keep(&blank("firm"), &params, &solved("firm", 1.0))
+            .keep(&blank(FIRM), &params, &solved(FIRM, 1.0))
             .unwrap();
         let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
-        assert_eq!(table, [solved("firm", 1.0)]);
+        assert_eq!(table, [solved(FIRM, 1.0)]);
     }
 }

@@ -161,6 +161,7 @@ mod tests {
     use super::super::statistics::cases::{cohort, with_limit};
     use super::*;
     use crate::result::row::Row;
+    use crate::result::settings::Method;
 
     fn of(rows: &[Row]) -> Vec<Figure> {
         figures(&samples(rows).0)
@@ -178,7 +179,11 @@ mod tests {
 
     #[test]
     fn two_limits_differ_in_name_colour_and_marker() {
-        let rows = with_limit(with_limit(cohort(4), "lattice", 0.05), "voxel-fe", 0.02);
+        let rows = with_limit(
+            with_limit(cohort(4), Method::Lattice, 0.05),
+            Method::VoxelFe,
+            0.02,
+        );
         let figures = of(&rows);
         let expected = [
             "methods",

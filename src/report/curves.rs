@@ -4,12 +4,13 @@ use super::figure::{Axis, Content, Curve, Figure, Mark, Point};
 use super::table::{condition, varying_settings};
 use super::{Model, distinct};
 use crate::result::row::Row;
+use crate::result::settings::CellType;
 use crate::result::statistics::regression::regression;
 
 /// Curves of one colour and marker: one structure, one model, one set of settings.
 #[derive(Debug, Clone, PartialEq)]
 struct Family {
-    structure: String,
+    structure: CellType,
     model: Model,
     condition: Option<String>,
 }
@@ -23,18 +24,19 @@ struct Solved<'a> {
 
 fn solved(rows: &[Row]) -> Vec<Solved<'_>> {
     let varying = varying_settings(rows);
-    let one = |row| {
-        Some(Solved {
-            family: Family {
-                structure: Row::clone(row).structure,
-                model: Model::of(row)?,
-                condition: condition(row, &varying),
-            },
-            e_app_mpa: row.e_app_mpa?,
-            row,
+    rows.iter()
+        .filter_map(|row| {
+            Some(Solved {
+                family: Family {
+                    structure: row.key.structure,
+                    model: Model::of(row)?,
+                    condition: condition(row, &varying),
+                },
+                e_app_mpa: row.e_app_mpa()?,
+                row,
+            })
         })
-    };
-    rows.iter().filter_map(one).collect()
+        .collect()
 }
 
 /// A curve per family, `points` of each. Names say only what tells the curves apart.
@@ -48,7 +50,7 @@ fn curves<'a>(
         families
             .iter()
             .map(|f| &f.structure)
-            .filter(|s| *s != "hex8"),
+            .filter(|s| **s != CellType::Hex8),
     );
     let conditions = distinct(families.iter().map(|f| &f.condition));
     let curve = |family: &Family| {
@@ -59,7 +61,7 @@ fn curves<'a>(
             Some(_) if lattices.len() > 1 => {
                 format!(
                     "{} {}",
-                    family.structure.to_uppercase(),
+                    family.structure.name().to_uppercase(),
                     family.model.name()
                 )
             }
@@ -90,7 +92,7 @@ fn curves<'a>(
 /// E_app against lattice parameter, a figure per scan. Extrapolated values are level lines.
 pub fn convergence(rows: &[Row]) -> Vec<Figure> {
     let solved = solved(rows);
-    distinct(solved.iter().map(|s| &s.row.scan))
+    distinct(solved.iter().map(|s| &s.row.key.scan))
         .into_iter()
         .map(|scan| convergence_of(scan, &solved))
         .collect()
@@ -99,13 +101,13 @@ pub fn convergence(rows: &[Row]) -> Vec<Figure> {
 fn convergence_of(scan: &str, solved: &[Solved]) -> Figure {
     let (levels, found): (Vec<_>, Vec<_>) = solved
         .iter()
-        .filter(|s| s.row.scan == scan)
+        .filter(|s| s.row.key.scan == scan)
         .map(|s| Solved {
             family: s.family.clone(),
             ..*s
         })
         .partition(|s| s.family.model.is_limit());
-    let widest = found.iter().map(|s| s.row.lp_mm).fold(0.0, f64::max);
+    let widest = found.iter().map(|s| s.row.key.lp_mm).fold(0.0, f64::max);
     let mut curves_ = curves(&found, Mark::Joined, |members| {
         let mut points: Vec<Point> = members.iter().map(|s| with_error(s)).collect();
         points.sort_by(|a, b| a.x.total_cmp(&b.x));
@@ -128,11 +130,11 @@ fn convergence_of(scan: &str, solved: &[Solved]) -> Figure {
 
 /// The stated algebraic and discretisation errors together, where there are any.
 fn with_error(s: &Solved) -> Point {
-    let errors = [s.row.algebraic_error_mpa, s.row.discretization_error_mpa];
+    let errors = s.row.stated_errors_mpa();
     let stated = errors.iter().flatten().count() > 0;
     let error: f64 = errors.iter().flatten().map(|e| e.abs()).sum();
     Point {
-        x: s.row.lp_mm,
+        x: s.row.key.lp_mm,
         y: s.e_app_mpa,
         y_error: stated.then_some([error, error]),
     }
@@ -142,14 +144,14 @@ fn with_error(s: &Solved) -> Point {
 /// more. None for fewer than two scans.
 pub fn against_bv_tv(rows: &[Row]) -> Option<Figure> {
     let mut solved = solved(rows);
-    solved.retain(|s| s.row.converged != Some(false));
-    if distinct(solved.iter().map(|s| &s.row.scan)).len() < 2 {
+    solved.retain(|s| s.row.converged() != Some(false));
+    if distinct(solved.iter().map(|s| &s.row.key.scan)).len() < 2 {
         return None;
     }
     let mut curves = curves(&solved, Mark::Points, |members| {
         finest(members)
             .iter()
-            .map(|s| Point::new(s.row.bv_tv, s.e_app_mpa))
+            .map(|s| Point::new(s.row.key.bv_tv, s.e_app_mpa))
             .collect()
     });
     let lines: Vec<Curve> = curves.iter().filter_map(least_squares).collect();
@@ -182,10 +184,10 @@ fn least_squares(curve: &Curve) -> Option<Curve> {
 
 /// Of each scan the member with the smallest lattice parameter.
 fn finest<'a, 'b>(members: &[&'b Solved<'a>]) -> Vec<&'b Solved<'a>> {
-    let scans = distinct(members.iter().map(|s| &s.row.scan));
+    let scans = distinct(members.iter().map(|s| &s.row.key.scan));
     let of = |scan| {
-        let own = members.iter().filter(|s| &s.row.scan == scan);
-        own.min_by(|a, b| a.row.lp_mm.total_cmp(&b.row.lp_mm))
+        let own = members.iter().filter(|s| &s.row.key.scan == scan);
+        own.min_by(|a, b| a.row.key.lp_mm.total_cmp(&b.row.key.lp_mm))
             .copied()
     };
     scans.into_iter().filter_map(of).collect()
@@ -195,16 +197,16 @@ fn finest<'a, 'b>(members: &[&'b Solved<'a>]) -> Vec<&'b Solved<'a>> {
 pub fn wall_time(rows: &[Row]) -> Option<Figure> {
     let mut solved = solved(rows);
     solved.retain(|s| {
-        s.row.sites != Some(0)
+        s.row.solved.as_ref().is_some_and(|r| r.sites != Some(0))
             && s.family.model != Model::Ffb
-            && s.row.wall_s.is_some_and(|t| t > 0.0)
+            && s.row.wall_s().is_some_and(|t| t > 0.0)
     });
     let curves = curves(&solved, Mark::Joined, |members| {
-        let mut sizes = distinct(members.iter().map(|s| s.row.lp_mm));
+        let mut sizes = distinct(members.iter().map(|s| s.row.key.lp_mm));
         sizes.sort_by(f64::total_cmp);
         let at = |lp: f64| {
-            let same = members.iter().filter(|s| s.row.lp_mm == lp);
-            median_with_range(lp, same.filter_map(|s| s.row.wall_s).collect())
+            let same = members.iter().filter(|s| s.row.key.lp_mm == lp);
+            median_with_range(lp, same.filter_map(|s| s.row.wall_s()).collect())
         };
         sizes.into_iter().map(at).collect()
     });
@@ -236,22 +238,22 @@ fn median_with_range(x: f64, mut values: Vec<f64>) -> Point {
 pub fn speed_error(rows: &[Row]) -> Option<Figure> {
     let all = solved(rows);
     let references: Vec<(&String, &Option<String>, f64)> =
-        distinct(all.iter().map(|s| (&s.row.scan, &s.family.condition)))
+        distinct(all.iter().map(|s| (&s.row.key.scan, &s.family.condition)))
             .into_iter()
             .filter_map(|(scan, condition)| {
                 let own: Vec<&Solved> = all
                     .iter()
-                    .filter(|s| &s.row.scan == scan && &s.family.condition == condition)
+                    .filter(|s| &s.row.key.scan == scan && &s.family.condition == condition)
                     .collect();
                 Some((scan, condition, reference(&own)?))
             })
             .collect();
     let error_of = |s: &Solved| {
         let (_, _, truth) = references.iter().find(|(scan, condition, _)| {
-            *scan == &s.row.scan && *condition == &s.family.condition
+            *scan == &s.row.key.scan && *condition == &s.family.condition
         })?;
         let percent = 100.0 * (s.e_app_mpa / truth - 1.0).abs();
-        let time = s.row.wall_s.filter(|t| *t > 0.0)?;
+        let time = s.row.wall_s().filter(|t| *t > 0.0)?;
         (percent > 0.0).then(|| Point::new(time, percent))
     };
     let curves = curves(&all, Mark::Points, |members| {
@@ -275,7 +277,7 @@ fn reference(own: &[&Solved]) -> Option<f64> {
     let finest = own
         .iter()
         .filter(|s| s.family.model == Model::VoxelFe)
-        .min_by(|a, b| a.row.lp_mm.total_cmp(&b.row.lp_mm));
+        .min_by(|a, b| a.row.key.lp_mm.total_cmp(&b.row.key.lp_mm));
     extrapolated
         .or(finest)
         .map(|s| s.e_app_mpa)

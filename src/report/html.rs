@@ -179,7 +179,7 @@ fn e_app(report: &Report) -> Table {
                 link: Some(line.scan.clone()),
                 ..text(&line.scan)
             },
-            text(&line.structure.to_uppercase()),
+            text(&line.structure.name().to_uppercase()),
             Cell {
                 text: lp(line.lp_mm),
                 ..number(Some(line.lp_mm))

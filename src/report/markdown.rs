@@ -112,7 +112,7 @@ fn e_app_table(lines: &[Line]) -> String {
 fn cells(line: &Line, models: &[Model], conditions: bool) -> Vec<String> {
     let mut cells = vec![
         line.scan.replace('|', "\\|"),
-        line.structure.to_uppercase(),
+        line.structure.name().to_uppercase(),
         line.lp_mm.to_string(),
     ];
     cells.extend(conditions.then(|| line.condition.clone().unwrap_or_default()));
@@ -162,7 +162,6 @@ mod tests {
     fn the_table_has_a_column_per_model_found() {
         let line = Line {
             scan: "a|b".to_owned(),
-            structure: "sc".to_owned(),
             lp_mm: 0.1,
             young_mpa: 1000.0,
             floppy_mpa: Some(32.82),

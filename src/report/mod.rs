@@ -11,7 +11,9 @@ mod sample;
 pub mod statistics;
 pub mod table;
 
+use crate::discretisation::lattice::placement::Boundary;
 use crate::result::row::Row;
+use crate::result::settings::{BoundaryRule, Method};
 use figure::Figure;
 use serde::{Deserialize, Serialize};
 use statistics::Statistics;
@@ -85,16 +87,16 @@ fn notes(rows: &[Row]) -> Vec<String> {
 /// Scan, what is to be known, which row.
 fn note(row: &Row) -> Option<(&str, String, String)> {
     let model = Model::of(row)?;
-    let words = match (&row.note, row.converged) {
+    let words = match (&row.marks.note, row.converged()) {
         (Some(note), _) => note.clone(),
         (None, Some(false)) => "not converged".to_owned(),
         (None, _) => return None,
     };
-    let structure = row.structure.to_uppercase();
+    let structure = row.key.structure.name().to_uppercase();
     Some((
-        &row.scan,
+        &row.key.scan,
         words,
-        format!("{structure} {} {} mm", model.name(), row.lp_mm),
+        format!("{structure} {} {} mm", model.name(), row.key.lp_mm),
     ))
 }
 
@@ -123,18 +125,18 @@ impl Model {
         Model::VoxelFeLimit,
     ];
 
-    /// None for a row of a kind this report does not know.
+    /// None for a lattice without a boundary, which no table holds that this program wrote.
     pub fn of(row: &Row) -> Option<Model> {
-        match row.boundary.as_deref() {
-            Some("floppy") => Some(Model::Floppy),
-            Some("firm") => Some(Model::Firm),
-            Some("ffb") => Some(Model::Ffb),
-            Some("graded") => Some(Model::Graded),
-            Some("extrapolated") if row.method == "voxel-fe" => Some(Model::VoxelFeLimit),
-            Some("extrapolated") => Some(Model::GradedLimit),
-            None if row.method == "voxel-fe" => Some(Model::VoxelFe),
-            _ => None,
-        }
+        Some(match (row.key.boundary, row.key.method) {
+            (Some(BoundaryRule::Sites(Boundary::Floppy)), _) => Model::Floppy,
+            (Some(BoundaryRule::Sites(Boundary::Firm)), _) => Model::Firm,
+            (Some(BoundaryRule::Sites(Boundary::Graded)), _) => Model::Graded,
+            (Some(BoundaryRule::Ffb), _) => Model::Ffb,
+            (Some(BoundaryRule::Extrapolated), Method::Lattice) => Model::GradedLimit,
+            (Some(BoundaryRule::Extrapolated), Method::VoxelFe) => Model::VoxelFeLimit,
+            (None, Method::VoxelFe) => Model::VoxelFe,
+            (None, Method::Lattice) => return None,
+        })
     }
 
     /// A value in the limit, without a lattice parameter of its own.
@@ -169,19 +171,25 @@ fn distinct<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::Axis;
+    use crate::result::row::Solution;
+    use crate::result::settings::{CellType, Settings};
 
-    fn row(scan: &str, boundary: &str, lp_mm: f64, e: f64) -> Row {
+    fn row(scan: &str, boundary: BoundaryRule, lp_mm: f64, e: f64) -> Row {
         Row {
-            scan: scan.to_owned(),
-            method: "lattice".to_owned(),
-            structure: "sc".to_owned(),
-            boundary: Some(boundary.to_owned()),
-            lp_mm,
-            young_mpa: 1000.0,
-            bv_tv: 0.2,
-            e_app_mpa: Some(e),
-            wall_s: Some(1.0),
-            axis: "z".to_owned(),
+            key: Settings {
+                scan: scan.to_owned(),
+                boundary: Some(boundary),
+                lp_mm,
+                young_mpa: 1000.0,
+                bv_tv: 0.2,
+                ..Settings::default()
+            },
+            solved: Some(Solution {
+                e_app_mpa: Some(e),
+                wall_s: Some(1.0),
+                ..Solution::default()
+            }),
             ..Row::default()
         }
     }
@@ -189,10 +197,10 @@ mod tests {
     #[test]
     fn a_line_holds_all_boundaries_of_one_lattice_parameter() {
         let rows = [
-            row("a", "floppy", 0.1, 30.0),
-            row("a", "firm", 0.1, 90.0),
-            row("a", "ffb", 0.1, 60.0),
-            row("a", "floppy", 0.2, 20.0),
+            row("a", BoundaryRule::FLOPPY, 0.1, 30.0),
+            row("a", BoundaryRule::FIRM, 0.1, 90.0),
+            row("a", BoundaryRule::Ffb, 0.1, 60.0),
+            row("a", BoundaryRule::FLOPPY, 0.2, 20.0),
         ];
         let report = report(&rows, &ReportParams::default());
         assert_eq!(report.lines.len(), 2);
@@ -212,21 +220,17 @@ mod tests {
 
     #[test]
     fn settings_that_differ_are_told_apart() {
-        let sideways = Row {
-            axis: "x".to_owned(),
-            ..row("a", "floppy", 0.1, 12.0)
-        };
-        let lines = table::lines(&[row("a", "floppy", 0.1, 30.0), sideways]);
+        let mut sideways = row("a", BoundaryRule::FLOPPY, 0.1, 12.0);
+        sideways.key.axis = Axis::X;
+        let lines = table::lines(&[row("a", BoundaryRule::FLOPPY, 0.1, 30.0), sideways]);
         assert_eq!(lines.len(), 2);
         assert_eq!(lines[1].condition.as_deref(), Some("axis x"));
     }
 
     #[test]
     fn a_row_that_is_not_converged_is_noted() {
-        let stalled = Row {
-            converged: Some(false),
-            ..row("a", "floppy", 0.1, 30.0)
-        };
+        let mut stalled = row("a", BoundaryRule::FLOPPY, 0.1, 30.0);
+        stalled.solved.as_mut().unwrap().converged = Some(false);
         let report = report(&[stalled], &ReportParams::default());
         assert_eq!(report.notes, ["a: not converged (SC floppy 0.1 mm)"]);
     }
@@ -237,20 +241,25 @@ mod tests {
             let report = report(rows, &ReportParams::default());
             report.figures.into_iter().map(|f| f.stem).collect()
         };
-        let fine = Row {
+        let mut fine = row("a", BoundaryRule::FLOPPY, 0.02, 50.0);
+        fine.key = Settings {
+            method: Method::VoxelFe,
+            structure: CellType::Hex8,
             boundary: None,
-            method: "voxel-fe".to_owned(),
-            structure: "hex8".to_owned(),
-            ..row("a", "", 0.02, 50.0)
+            ..fine.key
         };
-        let coarse = row("a", "floppy", 0.1, 30.0);
+        let coarse = row("a", BoundaryRule::FLOPPY, 0.1, 30.0);
         assert_eq!(stems(&[]), Vec::<String>::new());
         assert_eq!(
             stems(std::slice::from_ref(&coarse)),
             ["convergence-a", "wall-time"]
         );
         assert_eq!(
-            stems(&[coarse.clone(), fine, row("b", "floppy", 0.1, 10.0)]),
+            stems(&[
+                coarse.clone(),
+                fine,
+                row("b", BoundaryRule::FLOPPY, 0.1, 10.0)
+            ]),
             [
                 "convergence-a",
                 "convergence-b",

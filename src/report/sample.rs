@@ -3,6 +3,7 @@
 use super::table::{condition, varying_settings};
 use super::{Model, distinct};
 use crate::result::row::Row;
+use crate::result::settings::CellType;
 
 /// Fewer scans than this make no statistics.
 pub(super) const LEAST_SCANS: usize = 3;
@@ -23,7 +24,7 @@ pub(super) struct Case {
 pub struct Sample {
     pub method: String,
     pub(super) model: Model,
-    pub(super) structure: String,
+    pub(super) structure: CellType,
     pub(super) cases: Vec<Case>,
 }
 
@@ -47,26 +48,27 @@ impl Sample {
 ///
 /// Only converged rows of the settings that most scans share are compared (of the first, where several are shared alike).
 pub fn samples(rows: &[Row]) -> (Vec<Sample>, Vec<String>) {
-    let usable = |row: &&Row| row.converged != Some(false) && row.e_app_mpa.is_some();
+    let usable = |row: &&Row| row.converged() != Some(false) && row.e_app_mpa().is_some();
     let known = rows.iter().filter(|row| Model::of(row).is_some());
     // Where a lattice falls is chance, no setting: limits are over all registrations.
     let comparable: Vec<Row> = known
         .clone()
         .filter(usable)
-        .map(|row| Row {
-            registration: None,
-            ..row.clone()
+        .map(|row| {
+            let mut row = row.clone();
+            row.key.registration_mm = None;
+            row
         })
         .collect();
-    let scans = distinct(known.map(|row| &row.scan));
+    let scans = distinct(known.map(|row| &row.key.scan));
     if scans.len() < LEAST_SCANS {
         return (Vec::new(), Vec::new());
     }
     let (kept, other_settings) = of_shared_settings(&comparable);
     let mut samples = by_method(&kept);
     let elsewhere = |scan: &str| {
-        let has = |rows: &[&Row]| rows.iter().any(|row| row.scan == scan);
-        !has(&kept) && comparable.iter().any(|row| row.scan == scan)
+        let has = |rows: &[&Row]| rows.iter().any(|row| row.key.scan == scan);
+        !has(&kept) && comparable.iter().any(|row| row.key.scan == scan)
     };
     let mut scans: Vec<&str> = scans.into_iter().map(String::as_str).collect();
     scans.retain(|scan| !elsewhere(scan));
@@ -82,7 +84,7 @@ fn of_shared_settings(rows: &[Row]) -> (Vec<&Row>, Option<String>) {
     let words = |row: &Row| condition(row, &varying).unwrap_or_default();
     let scans_with = |settings: &String| {
         let own = rows.iter().filter(|row| words(row) == *settings);
-        distinct(own.map(|row| &row.scan))
+        distinct(own.map(|row| &row.key.scan))
     };
     let all = distinct(rows.iter().map(words));
     // The last of equals is taken: reversed, the first.
@@ -108,24 +110,30 @@ fn of_shared_settings(rows: &[Row]) -> (Vec<&Row>, Option<String>) {
 
 /// Each method with the scans that it was used on, in order of first appearance.
 fn by_method(rows: &[&Row]) -> Vec<Sample> {
-    let method = |row: &Row| Some((Model::of(row)?, row.structure.clone()));
+    let method = |row: &Row| Some((Model::of(row)?, row.key.structure));
     let methods = distinct(rows.iter().filter_map(|row| method(row)));
-    let lattices = distinct(methods.iter().filter(|(_, s)| s != "hex8").map(|(_, s)| s)).len();
-    let scans = distinct(rows.iter().map(|row| &row.scan));
-    let sample = |(model, structure): &(Model, String)| {
-        let own = |row: &&&Row| Model::of(row) == Some(*model) && row.structure == *structure;
+    let lattices = distinct(
+        methods
+            .iter()
+            .filter(|(_, s)| *s != CellType::Hex8)
+            .map(|(_, s)| s),
+    )
+    .len();
+    let scans = distinct(rows.iter().map(|row| &row.key.scan));
+    let sample = |(model, structure): &(Model, CellType)| {
+        let own = |row: &&&Row| Model::of(row) == Some(*model) && row.key.structure == *structure;
         let finest = |scan: &&String| {
-            let of_scan = rows.iter().filter(own).filter(|row| row.scan == **scan);
-            case(of_scan.min_by(|a, b| a.lp_mm.total_cmp(&b.lp_mm))?)
+            let of_scan = rows.iter().filter(own).filter(|row| row.key.scan == **scan);
+            case(of_scan.min_by(|a, b| a.key.lp_mm.total_cmp(&b.key.lp_mm))?)
         };
-        let prefix = match lattices > 1 && structure != "hex8" {
-            true => format!("{} ", structure.to_uppercase()),
+        let prefix = match lattices > 1 && *structure != CellType::Hex8 {
+            true => format!("{} ", structure.name().to_uppercase()),
             false => String::new(),
         };
         Sample {
             method: format!("{prefix}{}", model.name()),
             model: *model,
-            structure: structure.clone(),
+            structure: *structure,
             cases: scans.iter().filter_map(finest).collect(),
         }
     };
@@ -133,16 +141,16 @@ fn by_method(rows: &[&Row]) -> Vec<Sample> {
 }
 
 fn case(row: &Row) -> Option<Case> {
-    let e_app_mpa = row.e_app_mpa?;
-    let errors = [row.algebraic_error_mpa, row.discretization_error_mpa];
-    let stated = row.discretization_error_mpa.map(|_| {
+    let e_app_mpa = row.e_app_mpa()?;
+    let errors = row.stated_errors_mpa();
+    let stated = errors[1].map(|_| {
         let sum: f64 = errors.iter().flatten().map(|e| e.abs()).sum();
         sum / e_app_mpa
     });
     Some(Case {
-        scan: row.scan.clone(),
-        group: row.group.clone(),
-        bv_tv: row.bv_tv,
+        scan: row.key.scan.clone(),
+        group: row.marks.group.clone(),
+        bv_tv: row.key.bv_tv,
         e_app_mpa,
         stated: stated.filter(|s| s.is_finite()),
     })
@@ -176,6 +184,8 @@ fn lacking(samples: &[Sample], scans: &[&str]) -> Option<String> {
 mod tests {
     use super::super::statistics::cases::{cohort, scans_of};
     use super::*;
+    use crate::grid::Axis;
+    use crate::result::settings::{BoundaryRule, Method, Settings};
 
     #[test]
     fn two_scans_make_no_statistics() {
@@ -193,7 +203,7 @@ mod tests {
     #[test]
     fn a_scan_without_one_of_the_methods_is_left_out_of_that_one_only() {
         let mut rows = cohort(4);
-        rows.retain(|row| !(row.scan == "s2" && row.boundary.as_deref() == Some("firm")));
+        rows.retain(|row| !(row.key.scan == "s2" && row.key.boundary == Some(BoundaryRule::FIRM)));
         let (samples, notes) = samples(&rows);
         assert_eq!(scans_of(&samples[0]), ["s1", "s2", "s3", "s4"]);
         assert_eq!(scans_of(&samples[1]), ["s1", "s3", "s4"]);
@@ -208,12 +218,14 @@ mod tests {
     fn one_solve_more_of_one_scan_takes_nothing_away() {
         let mut rows = cohort(4);
         let (before, _) = samples(&rows);
-        rows.push(Row {
-            method: "voxel-fe".to_owned(),
-            structure: "hex8".to_owned(),
+        let mut more = rows[0].clone();
+        more.key = Settings {
+            method: Method::VoxelFe,
+            structure: CellType::Hex8,
             boundary: None,
-            ..rows[0].clone()
-        });
+            ..more.key
+        };
+        rows.push(more);
         let (after, notes) = samples(&rows);
         assert_eq!(after, before);
         assert!(notes[0].contains("in no comparison: voxel FE"), "{notes:?}");
@@ -224,18 +236,13 @@ mod tests {
         let mut rows = cohort(4);
         let (before, _) = samples(&rows);
         // Finer than what is compared, but along another axis; and a scan of another tissue.
-        rows.insert(
-            0,
-            Row {
-                axis: "x".to_owned(),
-                lp_mm: 0.01,
-                ..rows[0].clone()
-            },
-        );
-        let stiffer = |row: &Row| Row {
-            scan: "s9".to_owned(),
-            young_mpa: 5.0,
-            ..row.clone()
+        let mut sideways = rows[0].clone();
+        (sideways.key.axis, sideways.key.lp_mm) = (Axis::X, 0.01);
+        rows.insert(0, sideways);
+        let stiffer = |row: &Row| {
+            let mut row = row.clone();
+            (row.key.scan, row.key.young_mpa) = ("s9".to_owned(), 5.0);
+            row
         };
         let more: Vec<Row> = rows[1..7].iter().map(stiffer).collect();
         rows.extend(more);
@@ -246,14 +253,14 @@ mod tests {
             notes[0].contains("further rows with axis x, E 0 MPa"),
             "{notes:?}"
         );
-        assert!(notes[0].contains("s9 (axis , E 5 MPa)"), "{notes:?}");
+        assert!(notes[0].contains("s9 (axis z, E 5 MPa)"), "{notes:?}");
     }
 
     #[test]
     fn what_is_not_converged_is_left_out() {
         let mut rows = cohort(4);
-        for row in rows.iter_mut().filter(|row| row.scan == "s1") {
-            row.converged = Some(false);
+        for row in rows.iter_mut().filter(|row| row.key.scan == "s1") {
+            row.solved.as_mut().unwrap().converged = Some(false);
         }
         let (samples, notes) = samples(&rows);
         assert!(samples.iter().all(|s| scans_of(s) == ["s2", "s3", "s4"]));

@@ -2,29 +2,41 @@
 
 use super::*;
 use crate::report::sample::samples;
-use crate::result::row::Row;
+use crate::result::row::{Marks, Row, Solution};
+use crate::result::settings::{BoundaryRule, CellType, Method, Settings};
 
 pub(in super::super) mod cases {
     use super::*;
 
-    fn row(scan: usize, boundary: &str, lp_mm: f64) -> Row {
-        let stiff = if boundary == "firm" { 2.0 } else { 1.0 };
+    fn row(scan: usize, boundary: BoundaryRule, lp_mm: f64) -> Row {
+        let stiff = if boundary == BoundaryRule::FIRM {
+            2.0
+        } else {
+            1.0
+        };
         Row {
-            scan: format!("s{scan}"),
-            structure: "sc".to_owned(),
-            boundary: Some(boundary.to_owned()),
-            lp_mm,
-            bv_tv: 0.1 * scan as f64,
-            e_app_mpa: Some(stiff * (10.0 * scan as f64 + lp_mm)),
-            group: Some(if scan < 3 { "a" } else { "b" }.to_owned()),
-            ..Row::default()
+            key: Settings {
+                scan: format!("s{scan}"),
+                boundary: Some(boundary),
+                lp_mm,
+                bv_tv: 0.1 * scan as f64,
+                ..Settings::default()
+            },
+            solved: Some(Solution {
+                e_app_mpa: Some(stiff * (10.0 * scan as f64 + lp_mm)),
+                ..Solution::default()
+            }),
+            marks: Marks {
+                group: Some(if scan < 3 { "a" } else { "b" }.to_owned()),
+                ..Marks::default()
+            },
         }
     }
 
     /// Scans s1, s2, … by floppy, firm and FFB, each at two lattice parameters.
     pub fn cohort(n: usize) -> Vec<Row> {
         let scans = (1..=n).flat_map(|scan| {
-            ["floppy", "firm", "ffb"]
+            [BoundaryRule::FLOPPY, BoundaryRule::FIRM, BoundaryRule::Ffb]
                 .into_iter()
                 .flat_map(move |b| [row(scan, b, 0.2), row(scan, b, 0.1)])
         });
@@ -36,17 +48,30 @@ pub(in super::super) mod cases {
     }
 
     /// `rows` with the limit of a method for each scan, of this relative stated error.
-    pub fn with_limit(mut rows: Vec<Row>, method: &str, error: f64) -> Vec<Row> {
-        let lattice = method == "lattice";
-        for scan in distinct(rows.iter().map(|row| row.scan.clone())) {
-            let first = rows.iter().find(|row| row.scan == scan).unwrap().clone();
-            let e = 1.3 * first.e_app_mpa.unwrap() + 1e3 * first.bv_tv * first.bv_tv;
+    pub fn with_limit(mut rows: Vec<Row>, method: Method, error: f64) -> Vec<Row> {
+        let structure = match method {
+            Method::Lattice => CellType::default(),
+            Method::VoxelFe => CellType::Hex8,
+        };
+        for scan in distinct(rows.iter().map(|row| row.key.scan.clone())) {
+            let first = rows
+                .iter()
+                .find(|row| row.key.scan == scan)
+                .unwrap()
+                .clone();
+            let e = 1.3 * first.e_app_mpa().unwrap() + 1e3 * first.key.bv_tv * first.key.bv_tv;
             rows.push(Row {
-                method: method.to_owned(),
-                structure: if lattice { "sc" } else { "hex8" }.to_owned(),
-                boundary: Some("extrapolated".to_owned()),
-                e_app_mpa: Some(e),
-                discretization_error_mpa: Some(error * e),
+                key: Settings {
+                    method,
+                    structure,
+                    boundary: Some(BoundaryRule::Extrapolated),
+                    ..first.key
+                },
+                solved: Some(Solution {
+                    e_app_mpa: Some(e),
+                    discretization_error_mpa: Some(error * e),
+                    ..Solution::default()
+                }),
                 ..first
             });
         }
@@ -82,7 +107,7 @@ fn a_mean_is_not_held_against_its_own_parts() {
 
 #[test]
 fn all_are_held_against_an_independent_reference() {
-    let found = of(&with_limit(cohort(4), "voxel-fe", 0.01));
+    let found = of(&with_limit(cohort(4), Method::VoxelFe, 0.01));
     let fe = "voxel FE, extrapolated";
     assert_eq!(
         pairs(&found),
@@ -96,8 +121,8 @@ fn all_are_held_against_an_independent_reference() {
 fn two_limits_are_two_methods_and_the_one_of_less_error_is_the_reference() {
     let (graded, fe) = ("graded, extrapolated", "voxel FE, extrapolated");
     for (of_graded, of_fe, expected) in [(0.05, 0.02, fe), (0.02, 0.05, graded), (0.02, 0.02, fe)] {
-        let rows = with_limit(cohort(4), "lattice", of_graded);
-        let rows = with_limit(rows, "voxel-fe", of_fe);
+        let rows = with_limit(cohort(4), Method::Lattice, of_graded);
+        let rows = with_limit(rows, Method::VoxelFe, of_fe);
         let (samples, _) = samples(&rows);
         let found = reference(&samples).unwrap();
         assert_eq!((found.method.as_str(), samples.len()), (expected, 5));
@@ -106,9 +131,12 @@ fn two_limits_are_two_methods_and_the_one_of_less_error_is_the_reference() {
 
 #[test]
 fn a_reference_of_a_few_scans_does_not_decide_for_all() {
-    let few = with_limit(cohort(3), "voxel-fe", 0.01);
+    let few = with_limit(cohort(3), Method::VoxelFe, 0.01);
     let mut rows = cohort(8);
-    rows.extend(few.into_iter().filter(|row| row.method == "voxel-fe"));
+    rows.extend(
+        few.into_iter()
+            .filter(|row| row.key.method == Method::VoxelFe),
+    );
     let (samples, notes) = samples(&rows);
     assert_eq!(reference(&samples).unwrap().method, "FFB mean");
     let found = statistics(&samples);
@@ -137,6 +165,6 @@ fn a_mean_beside_its_parts_is_no_level_of_an_analysis_of_variance() {
     let said = found.analysis_of_variance().unwrap();
     assert!(said.contains("floppy; firm over 4 scans"), "{said}");
     // Beside one part only it is a level of its own.
-    rows.retain(|row| row.boundary.as_deref() != Some("firm"));
+    rows.retain(|row| row.key.boundary != Some(BoundaryRule::FIRM));
     assert_eq!(of(&rows).anova_between, ["floppy", "FFB mean"]);
 }

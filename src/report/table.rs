@@ -2,13 +2,14 @@
 
 use super::{Model, distinct};
 use crate::result::row::Row;
+use crate::result::settings::CellType;
 use serde::{Deserialize, Serialize};
 
 /// One line of the E_app table. `_over_tissue` is E_app over the tissue's Young's modulus.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 pub struct Line {
     pub scan: String,
-    pub structure: String,
+    pub structure: CellType,
     pub lp_mm: f64,
     /// The settings in which lines of this table differ, in words.
     pub condition: Option<String>,
@@ -55,7 +56,7 @@ impl Line {
     }
 
     fn add(&mut self, model: Model, row: &Row) {
-        self.errors_mpa[model as usize] = [row.algebraic_error_mpa, row.discretization_error_mpa];
+        self.errors_mpa[model as usize] = row.stated_errors_mpa();
         let (modulus, ratio) = match model {
             Model::Floppy => (&mut self.floppy_mpa, &mut self.floppy_over_tissue),
             Model::Firm => (&mut self.firm_mpa, &mut self.firm_over_tissue),
@@ -71,10 +72,10 @@ impl Line {
                 &mut self.voxel_fe_extrapolated_over_tissue,
             ),
         };
-        *modulus = row.e_app_mpa;
-        *ratio = row.e_app_mpa.map(|e| e / row.young_mpa);
+        *modulus = row.e_app_mpa();
+        *ratio = row.e_app_mpa().map(|e| e / row.key.young_mpa);
         if model != Model::Ffb {
-            self.wall_s = match (self.wall_s, row.wall_s) {
+            self.wall_s = match (self.wall_s, row.wall_s()) {
                 (Some(a), Some(b)) => Some(a + b),
                 (a, b) => a.or(b),
             };
@@ -92,21 +93,21 @@ pub fn lines(rows: &[Row]) -> Vec<Line> {
         };
         let condition = condition(row, &varying);
         let same = |line: &&mut Line| {
-            line.scan == row.scan
-                && line.structure == row.structure
-                && line.lp_mm == row.lp_mm
+            line.scan == row.key.scan
+                && line.structure == row.key.structure
+                && line.lp_mm == row.key.lp_mm
                 && line.condition == condition
         };
         match lines.iter_mut().find(same) {
             Some(line) => line.add(model, row),
             None => {
                 let mut line = Line {
-                    scan: row.scan.clone(),
-                    structure: row.structure.clone(),
-                    lp_mm: row.lp_mm,
+                    scan: row.key.scan.clone(),
+                    structure: row.key.structure,
+                    lp_mm: row.key.lp_mm,
                     condition,
-                    bv_tv: row.bv_tv,
-                    young_mpa: row.young_mpa,
+                    bv_tv: row.key.bv_tv,
+                    young_mpa: row.key.young_mpa,
                     ..Line::default()
                 };
                 line.add(model, row);
@@ -119,22 +120,21 @@ pub fn lines(rows: &[Row]) -> Vec<Line> {
 
 /// The settings of a row that may set it apart from another of the same scan, structure and lattice parameter, in words.
 fn settings(row: &Row) -> [String; 8] {
+    let key = &row.key;
+    let [x, y, z] = key.registration_mm.unwrap_or([0.0; 3]);
     [
-        format!("axis {}", row.axis),
-        format!("load {}", row.load),
-        format!("ends {}", row.ends),
+        format!("axis {}", key.axis.name()),
+        format!("load {}", key.load.name()),
+        format!("ends {}", key.supports.name()),
         // By a law the bone's mean modulus is the scan's own, no setting.
-        match &row.material {
+        match &key.material {
             Some(law) => format!("tissue {law}"),
-            None => format!("E {} MPa", row.young_mpa),
+            None => format!("E {} MPa", key.young_mpa),
         },
-        format!("ν {}", row.poisson),
-        format!("strain {}", row.strain),
-        format!("grip {} mm", row.grip_mm),
-        format!(
-            "registration {}",
-            row.registration.as_deref().unwrap_or("0;0;0")
-        ),
+        format!("ν {}", key.poisson),
+        format!("strain {}", key.strain),
+        format!("grip {} mm", key.grip_mm),
+        format!("registration {x};{y};{z}"),
     ]
 }
 

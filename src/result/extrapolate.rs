@@ -4,11 +4,8 @@
 //! lattice in bending, smeared over a cell, falls with the square of LP, beside scatter of where cells fall. That of voxel
 //! FE falls with the power 1.3 (edges of voxels; 1.17 to 1.31 fitted on phantoms, `reports/speed-vs-error.md`), from above.
 
-use crate::result::ffb::settings_of;
-use crate::result::row::Row;
-
-/// Boundary name of a row in the limit.
-pub const EXTRAPOLATED: &str = "extrapolated";
+use crate::result::row::{Marks, Row, Solution};
+use crate::result::settings::{BoundaryRule, Load, Method, Settings};
 
 /// Order in LP of a graded lattice's error.
 const LATTICE_ORDER: f64 = 2.0;
@@ -24,7 +21,7 @@ const VOXEL_ERROR: f64 = 1.0;
 const STEP_LEFT: f64 = 0.75;
 
 /// What the voxels leave open on a lattice, `VOXELS_UNSEEN · voxel / strut thickness` of E_app: that load flows around
-/// steps of voxels is a rule of thumb there (`topology::pieces`), half of whose effect may be missing.
+/// steps of voxels is a rule of thumb there (`discretisation::lattice::connected`), half of whose effect may be missing.
 const VOXELS_UNSEEN: f64 = 0.25;
 
 /// What too few struts to average over leave open, `FEW_STRUTS · strut thickness / edge of the volume`: how a lattice
@@ -32,7 +29,7 @@ const VOXELS_UNSEEN: f64 = 0.25;
 const FEW_STRUTS: f64 = 0.9;
 
 /// The rows with one extrapolated row after the last of each series of graded lattices or voxel-FE solves that differ in
-/// resolution only. Extrapolated rows already there are made anew.
+/// resolution only. Extrapolated rows already there are replaced.
 pub fn with_extrapolated(rows: &[Row]) -> Vec<Row> {
     let mut all: Vec<Row> = Vec::new();
     let solved: Vec<&Row> = rows.iter().filter(|r| !is_extrapolated(r)).collect();
@@ -52,27 +49,27 @@ pub fn with_extrapolated(rows: &[Row]) -> Vec<Row> {
 }
 
 pub fn is_extrapolated(row: &Row) -> bool {
-    row.boundary.as_deref() == Some(EXTRAPOLATED)
+    row.key.boundary == Some(BoundaryRule::Extrapolated)
 }
 
 fn is_voxel_fe(row: &Row) -> bool {
-    row.method == "voxel-fe"
+    row.key.method == Method::VoxelFe
+}
+
+/// Voxel FE under one load, not the six of a stiffness matrix.
+fn is_one_load_of_voxel_fe(row: &Row) -> bool {
+    is_voxel_fe(row) && row.key.load != Load::Stiffness
 }
 
 fn in_series(row: &Row) -> bool {
-    let graded = row.boundary.as_deref() == Some("graded");
-    let resolved = graded || (is_voxel_fe(row) && row.load != "stiffness");
-    resolved && row.converged == Some(true) && row.e_app_mpa.is_some_and(|e| e > 0.0)
+    let graded = row.key.boundary == Some(BoundaryRule::GRADED);
+    (graded || is_one_load_of_voxel_fe(row))
+        && row.converged() == Some(true)
+        && row.e_app_mpa().is_some_and(|e| e > 0.0)
 }
 
 fn same_series(a: &Row, b: &Row) -> bool {
-    let settings = |row: &Row| Row {
-        lp_mm: 0.0,
-        registration: None,
-        tolerance: None,
-        ..settings_of(row)
-    };
-    in_series(a) && in_series(b) && a.boundary == b.boundary && settings(a) == settings(b)
+    in_series(a) && in_series(b) && a.key.without_resolution() == b.key.without_resolution()
 }
 
 /// Size, mean modulus over registrations, and half their range.
@@ -83,12 +80,12 @@ struct Level {
 }
 
 fn levels(series: &[&Row]) -> Vec<Level> {
-    let mut sizes: Vec<f64> = series.iter().map(|r| r.lp_mm).collect();
+    let mut sizes: Vec<f64> = series.iter().map(|r| r.key.lp_mm).collect();
     sizes.sort_by(f64::total_cmp);
     sizes.dedup();
     let level = |size: f64| {
-        let same = series.iter().filter(|r| r.lp_mm == size);
-        let e: Vec<f64> = same.filter_map(|r| r.e_app_mpa).collect();
+        let same = series.iter().filter(|r| r.key.lp_mm == size);
+        let e: Vec<f64> = same.filter_map(|r| r.e_app_mpa()).collect();
         let (low, high) = e
             .iter()
             .fold((f64::INFINITY, 0f64), |(l, h), &v| (l.min(v), h.max(v)));
@@ -103,7 +100,9 @@ fn levels(series: &[&Row]) -> Vec<Level> {
 
 fn limit(series: &[&Row]) -> Option<Row> {
     let levels = levels(series);
-    let finest = series.iter().min_by(|a, b| a.lp_mm.total_cmp(&b.lp_mm))?;
+    let finest = series
+        .iter()
+        .min_by(|a, b| a.key.lp_mm.total_cmp(&b.key.lp_mm))?;
     let (e_mpa, error_mpa, words) = if is_voxel_fe(finest) {
         voxel_limit(&levels)?
     } else {
@@ -111,24 +110,32 @@ fn limit(series: &[&Row]) -> Option<Row> {
     };
     let algebraic = series
         .iter()
-        .filter_map(|r| r.algebraic_error_mpa)
+        .filter_map(|r| r.stated_errors_mpa()[0])
         .fold(0.0, f64::max);
-    let finest_ones = series.iter().filter(|r| r.lp_mm == finest.lp_mm);
+    let finest_ones = series.iter().filter(|r| r.key.lp_mm == finest.key.lp_mm);
     let note = finest_ones
-        .filter_map(|r| r.note.as_ref())
+        .filter_map(|r| r.marks.note.as_ref())
         .fold(words, |all, note| match all.contains(note) {
             true => all,
             false => format!("{all}; {note}"),
         });
     Some(Row {
-        boundary: Some(EXTRAPOLATED.to_owned()),
-        registration: None,
-        e_app_mpa: Some(e_mpa),
-        algebraic_error_mpa: Some(algebraic),
-        discretization_error_mpa: Some(error_mpa),
-        wall_s: series.iter().map(|r| r.wall_s).sum(),
-        note: Some(note),
-        ..settings_of(finest)
+        key: Settings {
+            boundary: Some(BoundaryRule::Extrapolated),
+            registration_mm: None,
+            ..finest.key.clone()
+        },
+        solved: Some(Solution {
+            e_app_mpa: Some(e_mpa),
+            algebraic_error_mpa: Some(algebraic),
+            discretization_error_mpa: Some(error_mpa),
+            wall_s: series.iter().map(|r| r.wall_s()).sum(),
+            ..Solution::default()
+        }),
+        marks: Marks {
+            note: Some(note),
+            ..finest.marks.clone()
+        },
     })
 }
 
@@ -180,9 +187,9 @@ fn lattice_limit(levels: &[Level], finest: &Row) -> Option<(f64, f64, String)> {
         .sum();
     let scatter = (off / weight).sqrt().max(levels[0].scatter_mpa);
     let step = (levels[0].e_mpa - e).abs();
-    let thickness = finest.mean_thickness_mm?;
-    let voxels = VOXELS_UNSEEN * e * voxel_mm(finest)? / thickness;
-    let struts = FEW_STRUTS * e * thickness / finest.tv_mm3.cbrt();
+    let thickness = finest.marks.mean_thickness_mm?;
+    let voxels = VOXELS_UNSEEN * e * mean_edge(finest.key.voxel_mm) / thickness;
+    let struts = FEW_STRUTS * e * thickness / finest.key.tv_mm3.cbrt();
     let sizes: Vec<String> = levels.iter().rev().map(|l| l.size.to_string()).collect();
     let words = format!(
         "limit of graded lattices at LP {} mm, order 2 in LP ({}); left open: {step:.3} MPa from the finest, scatter {scatter:.3}, voxels {voxels:.3}, few struts {struts:.3}",
@@ -221,18 +228,19 @@ fn fitted_order(levels: &[Level]) -> Option<f64> {
     order_of(three.map(|l| l.size), three.map(|l| l.e_mpa))
 }
 
-/// Mean voxel edge.
-fn voxel_mm(row: &Row) -> Option<f64> {
-    let edges: Option<Vec<f64>> = row.voxel_mm.split(';').map(|v| v.parse().ok()).collect();
-    let edges = edges?;
-    Some(edges.iter().product::<f64>().powf(1.0 / edges.len() as f64))
+fn mean_edge([x, y, z]: [f64; 3]) -> f64 {
+    if x == y && y == z {
+        x
+    } else {
+        (x * y * z).powf(1.0 / 3.0)
+    }
 }
 
 /// What one voxel-FE solve leaves open, from how thick struts are in elements. None where the thickness is not known.
 pub fn voxel_fe_error(row: &Row) -> Option<f64> {
-    let share = (row.lp_mm / row.mean_thickness_mm?).powf(VOXEL_ORDER);
-    (is_voxel_fe(row) && row.load != "stiffness").then_some(())?;
-    Some(VOXEL_ERROR * share * row.e_app_mpa?)
+    let share = (row.key.lp_mm / row.marks.mean_thickness_mm?).powf(VOXEL_ORDER);
+    is_one_load_of_voxel_fe(row).then_some(())?;
+    Some(VOXEL_ERROR * share * row.e_app_mpa()?)
 }
 
 /// Relative error to be expected of the limit from elements of this size and twice as long.
@@ -244,24 +252,41 @@ pub fn expected_of_pair(element_mm: f64, thickness_mm: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn row(boundary: Option<&str>, size: f64, e: f64) -> Row {
+    fn row(boundary: Option<BoundaryRule>, size: f64, e: f64) -> Row {
+        let method = match boundary {
+            Some(_) => Method::Lattice,
+            None => Method::VoxelFe,
+        };
         Row {
-            method: if boundary.is_some() {
-                "lattice"
-            } else {
-                "voxel-fe"
-            }
-            .to_owned(),
-            boundary: boundary.map(str::to_owned),
-            lp_mm: size,
-            e_app_mpa: Some(e),
-            converged: Some(true),
-            voxel_mm: "0.02".to_owned(),
-            mean_thickness_mm: Some(0.16),
-            tv_mm3: 64.0,
-            wall_s: Some(1.0),
-            ..Row::default()
+            key: Settings {
+                method,
+                boundary,
+                lp_mm: size,
+                voxel_mm: [0.02; 3],
+                tv_mm3: 64.0,
+                ..Settings::default()
+            },
+            solved: Some(Solution {
+                e_app_mpa: Some(e),
+                converged: Some(true),
+                wall_s: Some(1.0),
+                ..Solution::default()
+            }),
+            marks: Marks {
+                mean_thickness_mm: Some(0.16),
+                ..Marks::default()
+            },
         }
+    }
+
+    const GRADED: Option<BoundaryRule> = Some(BoundaryRule::GRADED);
+
+    fn error(row: &Row) -> f64 {
+        row.stated_errors_mpa()[1].unwrap()
+    }
+
+    fn note(row: &Row) -> &str {
+        row.marks.note.as_deref().unwrap()
     }
 
     /// Squared, of 70 MPa: struts of eight voxels, a volume of 25 struts.
@@ -272,64 +297,60 @@ mod tests {
     #[test]
     fn a_lattice_of_order_two_is_taken_to_its_limit() {
         let rows: Vec<Row> = [0.12, 0.1, 0.08]
-            .map(|lp| row(Some("graded"), lp, 70.0 + 500.0 * lp * lp))
+            .map(|lp| row(GRADED, lp, 70.0 + 500.0 * lp * lp))
             .to_vec();
         let all = with_extrapolated(&rows);
         assert_eq!(all.len(), 4);
         let e = &all[3];
-        assert!((e.e_app_mpa.unwrap() - 70.0).abs() < 1e-9, "{e:?}");
+        assert!((e.e_app_mpa().unwrap() - 70.0).abs() < 1e-9, "{e:?}");
         let stated = (3.2f64.powi(2) + left_open()).sqrt();
-        assert!((e.discretization_error_mpa.unwrap() - stated).abs() < 1e-9);
-        assert_eq!(e.wall_s, Some(3.0));
-        assert!(
-            e.note.as_ref().unwrap().contains("fitted 2.0"),
-            "{:?}",
-            e.note
-        );
+        assert!((error(e) - stated).abs() < 1e-9);
+        assert_eq!(e.wall_s(), Some(3.0));
+        assert!(note(e).contains("fitted 2.0"), "{e:?}");
         assert_eq!(with_extrapolated(&all), all);
     }
 
     #[test]
     fn two_lattices_are_no_series() {
-        let rows = [
-            row(Some("graded"), 0.1, 3.0),
-            row(Some("graded"), 0.05, 2.0),
-        ];
+        let rows = [row(GRADED, 0.1, 3.0), row(GRADED, 0.05, 2.0)];
         assert_eq!(with_extrapolated(&rows), rows);
-        assert_eq!(with_extrapolated(&[row(Some("firm"), 0.1, 3.0)]).len(), 1);
+        assert_eq!(
+            with_extrapolated(&[row(Some(BoundaryRule::FIRM), 0.1, 3.0)]).len(),
+            1
+        );
     }
 
     #[test]
     fn voxel_elements_of_order_1_3_are_taken_to_their_limit() {
         let e = |h: f64| 50.0 + 300.0 * h.powf(1.3);
         let mut fine = row(None, 0.01, e(0.01));
-        fine.note = Some("of the finest".to_owned());
+        fine.marks.note = Some("of the finest".to_owned());
         let all = with_extrapolated(&[row(None, 0.02, e(0.02)), fine]);
-        assert!(all[2].note.as_ref().unwrap().ends_with("; of the finest"));
-        assert_eq!(all[2].method, "voxel-fe");
+        assert!(note(&all[2]).ends_with("; of the finest"));
+        assert_eq!(all[2].key.method, Method::VoxelFe);
         assert!(
-            (all[2].e_app_mpa.unwrap() - 50.0).abs() < 1e-9,
+            (all[2].e_app_mpa().unwrap() - 50.0).abs() < 1e-9,
             "{:?}",
             all[2]
         );
         let open = 0.75 * (e(0.01) - 50.0);
-        assert!((all[2].discretization_error_mpa.unwrap() - open).abs() < 1e-9);
+        assert!((error(&all[2]) - open).abs() < 1e-9);
     }
 
     #[test]
     fn registrations_are_averaged_and_their_scatter_is_stated() {
         let mut rows = Vec::new();
         for lp in [0.12, 0.1, 0.08] {
-            for (shift, name) in [(-1.0, "0;0;0"), (1.0, "0.02;0;0")] {
-                let mut one = row(Some("graded"), lp, 70.0 + shift);
-                one.registration = Some(name.to_owned());
+            for (shift, registration) in [(-1.0, [0.0; 3]), (1.0, [0.02, 0.0, 0.0])] {
+                let mut one = row(GRADED, lp, 70.0 + shift);
+                one.key.registration_mm = Some(registration);
                 rows.push(one);
             }
         }
         let all = with_extrapolated(&rows);
         let e = all.last().unwrap();
-        assert!((e.e_app_mpa.unwrap() - 70.0).abs() < 1e-9);
-        assert!((e.discretization_error_mpa.unwrap() - (1.0 + left_open()).sqrt()).abs() < 1e-9);
+        assert!((e.e_app_mpa().unwrap() - 70.0).abs() < 1e-9);
+        assert!((error(e) - (1.0 + left_open()).sqrt()).abs() < 1e-9);
     }
 
     #[test]

@@ -3,4 +3,5 @@
 pub mod extrapolate;
 pub mod ffb;
 pub mod row;
+pub mod settings;
 pub mod statistics;

@@ -1,35 +1,24 @@
-//! Owns the record of one solve: a row of `results.csv`. Missing values are `None` here and `NA` in the file.
+//! Owns the record of one solve, a row of `results.csv`: the settings that it follows from, what was solved, and marks.
 
+mod columns;
+
+use crate::result::settings::Settings;
+use columns::Columns;
 use serde::{Deserialize, Serialize};
 
-/// One row of `results.csv`, its columns in the order of the fields.
+/// One row of results. In files it is flat: a column for each value, in the order of `columns.rs`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
-#[serde(default)]
+#[serde(try_from = "Columns", into = "Columns")]
 pub struct Row {
-    pub scan: String,
-    /// `lattice` or `voxel-fe`.
-    pub method: String,
-    /// `sc`, `bcc`, `fcc` or `hex8`.
-    pub structure: String,
-    /// `firm`, `floppy`, `graded`, `ffb`, `extrapolated`; None for voxel FE.
-    pub boundary: Option<String>,
-    /// Lattice parameter, or element size for voxel FE.
-    pub lp_mm: f64,
-    /// Offset of the lattice, `x;y;z` in mm.
-    pub registration: Option<String>,
-    /// Voxel edge; `x;y;z` where they differ.
-    pub voxel_mm: String,
-    pub young_mpa: f64,
-    pub poisson: f64,
-    pub load: String,
-    pub ends: String,
-    pub axis: String,
-    pub strain: f64,
-    /// 0 for end planes.
-    pub grip_mm: f64,
-    pub tv_definition: String,
-    pub tv_mm3: f64,
-    pub bv_tv: f64,
+    pub key: Settings,
+    /// None before the solve.
+    pub solved: Option<Solution>,
+    pub marks: Marks,
+}
+
+/// Numbers of a solve. What does not apply, or is not known, is None.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Solution {
     pub sites: Option<u64>,
     pub dropped_sites: Option<u64>,
     pub unknowns: Option<u64>,
@@ -44,22 +33,30 @@ pub struct Row {
     pub discretization_error_mpa: Option<f64>,
     pub wall_s: Option<f64>,
     pub peak_mib: Option<f64>,
-    /// Quick estimate of the struts' thickness, 2 BV / BS.
-    pub mean_thickness_mm: Option<f64>,
-    /// Relative algebraic error asked for in the headline.
-    pub tolerance: Option<f64>,
+    /// Motions that cost next to no energy, rigid motions of the whole apart; where `--mechanisms` asks for them.
+    pub mechanisms: Option<u64>,
+    /// By Pistoia's criterion, on request.
+    pub failure: Option<FailureLoad>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FailureLoad {
+    /// Magnitude of the reaction at failure.
+    pub load_n: f64,
+    /// What the load is multiplied by.
+    pub factor: f64,
+}
+
+/// What is known of a row or of its specimen beside the solve.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Marks {
     /// What a reader must know of this row (no path between the faces, not converged, ...).
     pub note: Option<String>,
     /// From a manifest.
     pub group: Option<String>,
     pub subject: Option<String>,
-    /// Motions that cost next to no energy, rigid motions of the whole apart; where `--mechanisms` asks for them.
-    pub mechanisms: Option<u64>,
-    /// The law by which tissue differs from voxel to voxel; `young_mpa` is then the bone's mean.
-    pub material: Option<String>,
-    /// By Pistoia's criterion, on request: magnitude of the reaction at failure, and what the load is multiplied by.
-    pub failure_load_n: Option<f64>,
-    pub failure_factor: Option<f64>,
+    /// Quick estimate of the struts' thickness, 2 BV / BS.
+    pub mean_thickness_mm: Option<f64>,
     /// Of the whole mask, where `segment --morphometry` measured it: mean local thickness of bone and of pores,
     /// connectivity density, degree of anisotropy by mean intercept lengths.
     pub tb_th_mm: Option<f64>,
@@ -68,10 +65,37 @@ pub struct Row {
     pub da: Option<f64>,
 }
 
+impl Row {
+    pub fn e_app_mpa(&self) -> Option<f64> {
+        self.solved.as_ref()?.e_app_mpa
+    }
+
+    pub fn converged(&self) -> Option<bool> {
+        self.solved.as_ref()?.converged
+    }
+
+    pub fn wall_s(&self) -> Option<f64> {
+        self.solved.as_ref()?.wall_s
+    }
+
+    /// Stated algebraic and discretisation error in MPa, each where there is one.
+    pub fn stated_errors_mpa(&self) -> [Option<f64>; 2] {
+        self.solved.as_ref().map_or([None, None], |s| {
+            [s.algebraic_error_mpa, s.discretization_error_mpa]
+        })
+    }
+
+    /// Whether no bone carries load from face to face: E_app is 0.
+    pub fn is_disconnected(&self) -> bool {
+        self.e_app_mpa() == Some(0.0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::io::table::{read, to_csv, write};
+    use crate::result::settings::{BoundaryRule, CellType, Conditions, Load, Method, Supports};
 
     /// The contract's columns, in order; more may follow.
     const COLUMNS: &str = "scan,method,structure,boundary,lp_mm,registration,voxel_mm,young_mpa,poisson,load,ends,axis,\
@@ -80,13 +104,32 @@ mod tests {
 
     fn row() -> Row {
         Row {
-            scan: "core, \"left\"".to_owned(),
-            lp_mm: 0.1 + 0.2,
-            voxel_mm: "0.02".to_owned(),
-            residual: Some(1.0 / 3.0 * 1e-12),
-            sites: Some(7),
-            converged: Some(false),
-            ..Row::default()
+            key: Settings {
+                scan: "core, \"left\"".to_owned(),
+                method: Method::VoxelFe,
+                structure: CellType::Hex8,
+                boundary: Some(BoundaryRule::Extrapolated),
+                lp_mm: 0.1 + 0.2,
+                registration_mm: Some([0.0, -0.01, 1e-7]),
+                voxel_mm: [0.02, 0.02, 0.03],
+                load: Load::Stiffness,
+                supports: Supports::Faces(Conditions::Mixed),
+                ..Settings::default()
+            },
+            solved: Some(Solution {
+                residual: Some(1.0 / 3.0 * 1e-12),
+                sites: Some(7),
+                converged: Some(false),
+                failure: Some(FailureLoad {
+                    load_n: 2.5,
+                    factor: 0.5,
+                }),
+                ..Solution::default()
+            }),
+            marks: Marks {
+                da: Some(1.25),
+                ..Marks::default()
+            },
         }
     }
 
@@ -96,12 +139,17 @@ mod tests {
     }
 
     #[test]
-    fn missing_values_are_na() {
+    fn values_are_words_and_missing_ones_are_na() {
         let text = to_csv(&[row()]);
+        let line = text.lines().nth(1).unwrap();
         assert!(
-            text.lines().nth(1).unwrap().ends_with(",NA,NA,NA,NA"),
-            "{text}"
+            line.starts_with(
+                "\"core, \"\"left\"\"\",voxel-fe,hex8,extrapolated,0.30000000000000004,0;-0.01;0.0000001,0.02;0.02;0.03,\
+                 0.0,0.0,stiffness,mixed,z,"
+            ),
+            "{line}"
         );
+        assert!(line.ends_with(",2.5,0.5,NA,NA,NA,1.25"), "{line}");
     }
 
     #[test]
@@ -113,14 +161,31 @@ mod tests {
     }
 
     #[test]
-    fn a_table_of_something_else_is_said() {
+    fn a_table_of_something_else_is_refused_with_its_column() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("results.csv");
-        std::fs::write(&path, "scan,lp_mm\na,thick\n").unwrap();
-        let words = read::<Row>(&path).unwrap_err().to_string();
-        assert!(
-            words.contains("results.csv") && words.contains("lp_mm"),
-            "{words}"
-        );
+        let whole = to_csv(&[Row::default()]);
+        for (from, to, expected) in [
+            (",0.0,", ",thick,", "lp_mm"),
+            ("lattice", "plates", "plates"),
+            (",sc,", ",hcp,", "one of sc, bcc, fcc, hex8, found `hcp`"),
+            (",sc,NA,", ",sc,ffg,", "ffb, extrapolated, found `ffg`"),
+            (
+                ",free,",
+                ",glued,",
+                "bonded, kinematic, mixed, found `glued`",
+            ),
+            ("NA,0,0.0", "1;2,0,0.0", "registration"),
+            ("method", "methods", "missing field `method`"),
+        ] {
+            let text = whole.replacen(from, to, 1);
+            assert_ne!(text, whole, "{from}");
+            std::fs::write(&path, text).unwrap();
+            let words = read::<Row>(&path).unwrap_err().to_string();
+            assert!(
+                words.contains("results.csv") && words.contains(expected),
+                "{expected}: {words}"
+            );
+        }
     }
 }

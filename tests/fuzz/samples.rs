@@ -289,9 +289,15 @@ fn tables() -> Vec<Sample> {
     let manifest = "path,name,group,subject,spacing_mm,lower,upper,otsu,gaussian_voxels\n\
                     a.nii,left,OA,p1,0.02,200,NA,,0.5\nb.nii,right,,p2,,,,true,\n";
     let row = bonepd_ct::result::row::Row {
-        scan: "s".into(),
-        e_app_mpa: Some(12.5),
-        sites: Some(7),
+        key: bonepd_ct::result::settings::Settings {
+            scan: "s".into(),
+            ..Default::default()
+        },
+        solved: Some(bonepd_ct::result::row::Solution {
+            e_app_mpa: Some(12.5),
+            sites: Some(7),
+            ..Default::default()
+        }),
         ..Default::default()
     };
     let results = bonepd_ct::io::table::to_csv(&[row]);

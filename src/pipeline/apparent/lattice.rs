@@ -19,7 +19,7 @@ use crate::pipeline::apparent::stress::Stress;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::{Ends, Load, SolveParams};
 use crate::pipeline::lattice::{Boundary, Case, build_connected, build_of, values_of};
-use crate::result::row::Row;
+use crate::result::settings::{BoundaryRule, CellType, Method, Settings};
 use crate::solver::amg::{Amg, AmgParams};
 use crate::solver::cg::fallback::minimise_or_fall_back;
 use crate::solver::cg::{CgInfo, CgParams, CgStep};
@@ -269,14 +269,13 @@ fn assess(
 }
 
 /// The columns that tell which lattice a row is of.
-pub fn label(row: Row, case: &Case) -> Row {
-    let [x, y, z] = case.registration_mm;
-    Row {
-        method: "lattice".into(),
-        structure: case.structure.name().into(),
-        boundary: Some(case.boundary.name().into()),
+pub fn label(key: Settings, case: &Case) -> Settings {
+    Settings {
+        method: Method::Lattice,
+        structure: CellType::Lattice(case.structure),
+        boundary: Some(BoundaryRule::Sites(case.boundary)),
         lp_mm: case.lp_mm,
-        registration: Some(format!("{x};{y};{z}")),
-        ..row
+        registration_mm: Some(case.registration_mm),
+        ..key
     }
 }

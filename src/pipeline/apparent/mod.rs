@@ -17,86 +17,8 @@ use crate::grid::Axis;
 use crate::measure::pistoia::Pistoia;
 use crate::physics::material::Material;
 use crate::pipeline::apparent::fields::Field;
+pub use crate::result::settings::{Conditions, Ends, Load, Method};
 use serde::{Deserialize, Serialize};
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    #[default]
-    Lattice,
-    VoxelFe,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
-pub enum Load {
-    #[default]
-    Uniaxial,
-    /// Sides held against lateral motion.
-    Confined,
-    /// All six unit strains: the apparent stiffness matrix.
-    Stiffness,
-}
-
-impl Load {
-    pub fn name(self) -> &'static str {
-        match self {
-            Load::Uniaxial => "uniaxial",
-            Load::Confined => "confined",
-            Load::Stiffness => "stiffness",
-        }
-    }
-}
-
-/// What the gripped sites may do sideways.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
-pub enum Ends {
-    #[default]
-    Free,
-    Bonded,
-}
-
-impl Ends {
-    pub fn name(self) -> &'static str {
-        match self {
-            Ends::Free => "free",
-            Ends::Bonded => "bonded",
-        }
-    }
-}
-
-/// What unit strains do on the faces of the volume.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
-pub enum Conditions {
-    /// Every node on a face moves as the homogeneous strain says: an upper bound.
-    #[default]
-    Kinematic,
-    /// Periodicity-compatible mixed uniform conditions (Pahr & Zysset 2008): faces slide as those of an orthotropic
-    /// periodic cell do, close to what larger specimens show.
-    Mixed,
-}
-
-impl Conditions {
-    pub fn name(self) -> &'static str {
-        match self {
-            Conditions::Kinematic => "kinematic",
-            Conditions::Mixed => "mixed",
-        }
-    }
-
-    pub fn in_words(self) -> &'static str {
-        match self {
-            Conditions::Kinematic => {
-                "kinematic uniform boundary conditions (u = strain x on all faces; an upper bound)"
-            }
-            Conditions::Mixed => {
-                "periodicity-compatible mixed uniform boundary conditions (Pahr & Zysset 2008)"
-            }
-        }
-    }
-}
 
 /// Settings of `solve`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

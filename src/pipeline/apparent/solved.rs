@@ -1,15 +1,15 @@
 //! Owns what a solve yields, and its row of the results table.
 
-use crate::grid::Grid;
 use crate::pipeline::apparent::{Load, SolveParams};
-use crate::result::row::Row;
+use crate::result::row::{Marks, Row, Solution};
+use crate::result::settings::{Settings, Supports};
 use crate::solver::cg::Ended;
 use crate::volume::Specimen;
 
 /// A number with the part of it that the solver left undone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moduli {
-    /// The headline (see [`crate::result::row::Row::e_app_mpa`]).
+    /// The headline (see [`Solution::e_app_mpa`]).
     pub e_app_mpa: f64,
     pub from_energy_mpa: f64,
     pub from_reaction_mpa: f64,
@@ -62,36 +62,36 @@ impl Solved {
 }
 
 impl SolveParams {
-    /// A row's settings, before any solve. Method, structure and resolution are the caller's to fill in.
-    pub fn row(&self, specimen: &Specimen) -> Row {
-        Row {
+    /// A row's settings. Method, structure and resolution are the caller's to fill in.
+    pub fn key(&self, specimen: &Specimen) -> Settings {
+        Settings {
             scan: specimen.name.clone(),
-            voxel_mm: voxel_words(&specimen.bone.grid),
+            voxel_mm: specimen.bone.grid.spacing_mm,
             young_mpa: self.young_mpa,
             poisson: self.poisson,
-            load: self.load.name().to_owned(),
-            ends: match self.load {
-                Load::Stiffness => self.conditions.name().to_owned(),
-                Load::Uniaxial | Load::Confined => self.ends.name().to_owned(),
+            load: self.load,
+            supports: match self.load {
+                Load::Stiffness => Supports::Faces(self.conditions),
+                Load::Uniaxial | Load::Confined => Supports::Ends(self.ends),
             },
-            axis: self.axis.name().to_owned(),
+            axis: self.axis,
             strain: self.strain,
             grip_mm: self.grip_mm,
             tv_definition: specimen.tv_definition.clone(),
             tv_mm3: specimen.tv_mm3,
             bv_tv: specimen.bv_tv(),
             tolerance: Some(self.tolerance),
-            ..Row::default()
+            ..Settings::default()
         }
     }
 }
 
 impl Solved {
-    /// Completes a row of settings with this solve's numbers. The clock and the memory are the caller's to fill in.
-    pub fn row(&self, settings: Row) -> Row {
+    /// Completes the row of a solve with its numbers. The clock and the memory are the caller's to fill in.
+    pub fn row(&self, blank: Row) -> Row {
         let m = &self.moduli;
         let count = |n: usize| Some(n as u64);
-        Row {
+        let solution = Solution {
             sites: count(self.sites),
             dropped_sites: count(self.dropped),
             unknowns: count(self.unknowns),
@@ -103,8 +103,15 @@ impl Solved {
             e_app_stress_mpa: Some(m.from_stress_mpa),
             algebraic_error_mpa: Some(m.algebraic_error_mpa).filter(|e| e.is_finite()),
             mechanisms: self.mechanisms.map(|n| n as u64),
-            note: self.note(),
-            ..settings
+            ..Solution::default()
+        };
+        Row {
+            solved: Some(solution),
+            marks: Marks {
+                note: self.note(),
+                ..blank.marks
+            },
+            ..blank
         }
     }
 
@@ -127,15 +134,5 @@ impl Solved {
             ),
             Ended::EnergyTolerance | Ended::ResidualTolerance => None,
         }
-    }
-}
-
-/// One edge where the voxels are cubes, `x;y;z` otherwise.
-fn voxel_words(grid: &Grid) -> String {
-    let [x, y, z] = grid.spacing_mm;
-    if x == y && y == z {
-        x.to_string()
-    } else {
-        format!("{x};{y};{z}")
     }
 }

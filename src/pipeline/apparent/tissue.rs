@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::physics::material::{Law, Material, Solid};
 use crate::pipeline::apparent::SolveParams;
-use crate::result::row::Row;
+use crate::result::settings::Settings;
 use crate::volume::Specimen;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -82,17 +82,17 @@ impl Tissue {
 
     /// The row's columns of tissue: the mean modulus, the one Poisson's ratio (where there are several, the settings'),
     /// the law in words.
-    pub fn label(&self, row: Row, params: &SolveParams) -> Row {
+    pub fn label(&self, key: Settings, params: &SolveParams) -> Settings {
         let poisson = match self {
             Tissue::Uniform(solid) => solid.poisson,
             Tissue::Mixed(mixed) if mixed.poissons.len() == 1 => mixed.poissons[0],
             Tissue::Mixed(_) => params.poisson,
         };
-        Row {
+        Settings {
             young_mpa: self.mean_mpa(),
             poisson,
             material: params.material.as_ref().map(Material::words),
-            ..row
+            ..key
         }
     }
 }

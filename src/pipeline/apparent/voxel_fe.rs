@@ -12,7 +12,7 @@ use crate::pipeline::apparent::fields::Recorded;
 use crate::pipeline::apparent::mechanisms::mechanisms;
 use crate::pipeline::apparent::solved::{Moduli, Solved};
 use crate::pipeline::apparent::{Ends, Load, SolveParams};
-use crate::result::row::Row;
+use crate::result::settings::{CellType, Method, Settings};
 use crate::solver::amg::{Amg, AmgParams};
 use crate::solver::cg::fallback::minimise_or_fall_back;
 use crate::solver::cg::{CgInfo, CgParams, CgStep, ENERGY_ALONE};
@@ -182,19 +182,19 @@ fn assess(
 }
 
 /// The columns that tell that a row is of voxel elements, and of which size (the mean edge where edges differ).
-pub fn label(row: Row, specimen: &Specimen, params: &SolveParams) -> Row {
+pub fn label(key: Settings, specimen: &Specimen, params: &SolveParams) -> Settings {
     let [x, y, z] = specimen.bone.grid.spacing_mm;
     let edge = if x == y && y == z {
         x
     } else {
         (x * y * z).cbrt()
     };
-    Row {
-        method: "voxel-fe".into(),
-        structure: "hex8".into(),
+    Settings {
+        method: Method::VoxelFe,
+        structure: CellType::Hex8,
         boundary: None,
         lp_mm: edge * params.coarsen as f64 / params.refine as f64,
-        registration: None,
-        ..row
+        registration_mm: None,
+        ..key
     }
 }

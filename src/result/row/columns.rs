@@ -1,0 +1,197 @@
+//! Owns the columns of `results.csv`, in their order. Missing values are `None` here and `NA` in the file.
+
+use crate::grid::Axis;
+use crate::result::row::{FailureLoad, Marks, Row, Solution};
+use crate::result::settings::{BoundaryRule, CellType, Load, Method, Settings, Supports};
+use serde::{Deserialize, Serialize};
+
+/// A row as files hold it. What the columns mean is at the fields of [`Settings`], [`Solution`] and [`Marks`].
+#[derive(Serialize, Deserialize)]
+pub(super) struct Columns {
+    scan: String,
+    method: Method,
+    structure: CellType,
+    boundary: Option<BoundaryRule>,
+    lp_mm: f64,
+    /// `x;y;z` in mm.
+    registration: Option<String>,
+    /// One edge where voxels are cubes, `x;y;z` otherwise.
+    voxel_mm: String,
+    young_mpa: f64,
+    poisson: f64,
+    load: Load,
+    ends: Supports,
+    axis: Axis,
+    strain: f64,
+    grip_mm: f64,
+    tv_definition: String,
+    tv_mm3: f64,
+    bv_tv: f64,
+    sites: Option<u64>,
+    dropped_sites: Option<u64>,
+    unknowns: Option<u64>,
+    iterations: Option<u64>,
+    residual: Option<f64>,
+    converged: Option<bool>,
+    e_app_mpa: Option<f64>,
+    e_app_reaction_mpa: Option<f64>,
+    e_app_stress_mpa: Option<f64>,
+    algebraic_error_mpa: Option<f64>,
+    discretization_error_mpa: Option<f64>,
+    wall_s: Option<f64>,
+    peak_mib: Option<f64>,
+    mean_thickness_mm: Option<f64>,
+    tolerance: Option<f64>,
+    note: Option<String>,
+    group: Option<String>,
+    subject: Option<String>,
+    mechanisms: Option<u64>,
+    material: Option<String>,
+    failure_load_n: Option<f64>,
+    failure_factor: Option<f64>,
+    tb_th_mm: Option<f64>,
+    tb_sp_mm: Option<f64>,
+    conn_d_per_mm3: Option<f64>,
+    da: Option<f64>,
+}
+
+impl From<Row> for Columns {
+    fn from(Row { key, solved, marks }: Row) -> Self {
+        let solved = solved.unwrap_or_default();
+        Columns {
+            scan: key.scan,
+            method: key.method,
+            structure: key.structure,
+            boundary: key.boundary,
+            lp_mm: key.lp_mm,
+            registration: key.registration_mm.map(triple),
+            voxel_mm: edges(key.voxel_mm),
+            young_mpa: key.young_mpa,
+            poisson: key.poisson,
+            load: key.load,
+            ends: key.supports,
+            axis: key.axis,
+            strain: key.strain,
+            grip_mm: key.grip_mm,
+            tv_definition: key.tv_definition,
+            tv_mm3: key.tv_mm3,
+            bv_tv: key.bv_tv,
+            sites: solved.sites,
+            dropped_sites: solved.dropped_sites,
+            unknowns: solved.unknowns,
+            iterations: solved.iterations,
+            residual: solved.residual,
+            converged: solved.converged,
+            e_app_mpa: solved.e_app_mpa,
+            e_app_reaction_mpa: solved.e_app_reaction_mpa,
+            e_app_stress_mpa: solved.e_app_stress_mpa,
+            algebraic_error_mpa: solved.algebraic_error_mpa,
+            discretization_error_mpa: solved.discretization_error_mpa,
+            wall_s: solved.wall_s,
+            peak_mib: solved.peak_mib,
+            mean_thickness_mm: marks.mean_thickness_mm,
+            tolerance: key.tolerance,
+            note: marks.note,
+            group: marks.group,
+            subject: marks.subject,
+            mechanisms: solved.mechanisms,
+            material: key.material,
+            failure_load_n: solved.failure.map(|f| f.load_n),
+            failure_factor: solved.failure.map(|f| f.factor),
+            tb_th_mm: marks.tb_th_mm,
+            tb_sp_mm: marks.tb_sp_mm,
+            conn_d_per_mm3: marks.conn_d_per_mm3,
+            da: marks.da,
+        }
+    }
+}
+
+impl TryFrom<Columns> for Row {
+    type Error = String;
+
+    fn try_from(c: Columns) -> Result<Self, String> {
+        let key = Settings {
+            scan: c.scan,
+            method: c.method,
+            structure: c.structure,
+            boundary: c.boundary,
+            lp_mm: c.lp_mm,
+            registration_mm: match c.registration {
+                Some(words) => Some(lengths("registration", &words)?),
+                None => None,
+            },
+            voxel_mm: lengths("voxel_mm", &c.voxel_mm)?,
+            young_mpa: c.young_mpa,
+            poisson: c.poisson,
+            load: c.load,
+            supports: c.ends,
+            axis: c.axis,
+            strain: c.strain,
+            grip_mm: c.grip_mm,
+            tv_definition: c.tv_definition,
+            tv_mm3: c.tv_mm3,
+            bv_tv: c.bv_tv,
+            tolerance: c.tolerance,
+            material: c.material,
+        };
+        let solved = Solution {
+            sites: c.sites,
+            dropped_sites: c.dropped_sites,
+            unknowns: c.unknowns,
+            iterations: c.iterations,
+            residual: c.residual,
+            converged: c.converged,
+            e_app_mpa: c.e_app_mpa,
+            e_app_reaction_mpa: c.e_app_reaction_mpa,
+            e_app_stress_mpa: c.e_app_stress_mpa,
+            algebraic_error_mpa: c.algebraic_error_mpa,
+            discretization_error_mpa: c.discretization_error_mpa,
+            wall_s: c.wall_s,
+            peak_mib: c.peak_mib,
+            mechanisms: c.mechanisms,
+            failure: c
+                .failure_load_n
+                .zip(c.failure_factor)
+                .map(|(load_n, factor)| FailureLoad { load_n, factor }),
+        };
+        Ok(Row {
+            key,
+            solved: (solved != Solution::default()).then_some(solved),
+            marks: Marks {
+                note: c.note,
+                group: c.group,
+                subject: c.subject,
+                mean_thickness_mm: c.mean_thickness_mm,
+                tb_th_mm: c.tb_th_mm,
+                tb_sp_mm: c.tb_sp_mm,
+                conn_d_per_mm3: c.conn_d_per_mm3,
+                da: c.da,
+            },
+        })
+    }
+}
+
+fn triple([x, y, z]: [f64; 3]) -> String {
+    format!("{x};{y};{z}")
+}
+
+fn edges(mm: [f64; 3]) -> String {
+    let [x, y, z] = mm;
+    if x == y && y == z {
+        x.to_string()
+    } else {
+        triple(mm)
+    }
+}
+
+/// Three lengths, or one for all.
+fn lengths(column: &str, words: &str) -> Result<[f64; 3], String> {
+    let parts: Result<Vec<f64>, _> = words.split(';').map(str::parse).collect();
+    match parts.as_deref() {
+        Ok(&[x]) => Ok([x; 3]),
+        Ok(&[x, y, z]) => Ok([x, y, z]),
+        _ => Err(format!(
+            "expected a length or three as x;y;z in column `{column}`, found `{words}`"
+        )),
+    }
+}

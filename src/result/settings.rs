@@ -1,0 +1,280 @@
+//! Owns what a row of results follows from: the scan, the method, the load, the supports and the tissue.
+
+use crate::discretisation::lattice::placement::Boundary;
+use crate::discretisation::lattice::stencil::Structure;
+use crate::grid::Axis;
+use serde::{Deserialize, Serialize};
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    #[default]
+    Lattice,
+    VoxelFe,
+}
+
+impl Method {
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Lattice => "lattice",
+            Method::VoxelFe => "voxel-fe",
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum Load {
+    #[default]
+    Uniaxial,
+    /// Sides held against lateral motion.
+    Confined,
+    /// All six unit strains: the apparent stiffness matrix.
+    Stiffness,
+}
+
+impl Load {
+    pub fn name(self) -> &'static str {
+        match self {
+            Load::Uniaxial => "uniaxial",
+            Load::Confined => "confined",
+            Load::Stiffness => "stiffness",
+        }
+    }
+}
+
+/// What the gripped sites may do sideways.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum Ends {
+    #[default]
+    Free,
+    Bonded,
+}
+
+impl Ends {
+    pub fn name(self) -> &'static str {
+        match self {
+            Ends::Free => "free",
+            Ends::Bonded => "bonded",
+        }
+    }
+}
+
+/// What unit strains do on the faces of the volume.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum Conditions {
+    /// Every node on a face moves as the homogeneous strain says: an upper bound.
+    #[default]
+    Kinematic,
+    /// Periodicity-compatible mixed uniform conditions (Pahr & Zysset 2008): faces slide as those of an orthotropic
+    /// periodic cell do, close to what larger specimens show.
+    Mixed,
+}
+
+impl Conditions {
+    pub fn name(self) -> &'static str {
+        match self {
+            Conditions::Kinematic => "kinematic",
+            Conditions::Mixed => "mixed",
+        }
+    }
+
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Conditions::Kinematic => {
+                "kinematic uniform boundary conditions (u = strain x on all faces; an upper bound)"
+            }
+            Conditions::Mixed => {
+                "periodicity-compatible mixed uniform boundary conditions (Pahr & Zysset 2008)"
+            }
+        }
+    }
+}
+
+/// Column `structure`: what a model is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "&'static str")]
+pub enum CellType {
+    Lattice(Structure),
+    /// Bricks of eight nodes.
+    Hex8,
+}
+
+impl CellType {
+    pub fn name(self) -> &'static str {
+        match self {
+            CellType::Lattice(structure) => structure.name(),
+            CellType::Hex8 => "hex8",
+        }
+    }
+}
+
+impl Default for CellType {
+    fn default() -> Self {
+        CellType::Lattice(Structure::Sc)
+    }
+}
+
+/// Column `boundary`: the rule by which a lattice's sites exist, or how a modulus follows from those of other rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "&'static str")]
+pub enum BoundaryRule {
+    Sites(Boundary),
+    /// Mean of firm and floppy.
+    Ffb,
+    /// Limit of several resolutions, of lattices or of elements.
+    Extrapolated,
+}
+
+impl BoundaryRule {
+    pub const FIRM: BoundaryRule = BoundaryRule::Sites(Boundary::Firm);
+    pub const FLOPPY: BoundaryRule = BoundaryRule::Sites(Boundary::Floppy);
+    pub const GRADED: BoundaryRule = BoundaryRule::Sites(Boundary::Graded);
+
+    pub fn name(self) -> &'static str {
+        match self {
+            BoundaryRule::Sites(boundary) => boundary.name(),
+            BoundaryRule::Ffb => "ffb",
+            BoundaryRule::Extrapolated => "extrapolated",
+        }
+    }
+
+    /// True for a value that follows from other rows, without a solve of its own.
+    pub fn is_derived(self) -> bool {
+        matches!(self, BoundaryRule::Ffb | BoundaryRule::Extrapolated)
+    }
+}
+
+/// Column `ends`: how the loaded faces are held, or all faces where `load` is `stiffness`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "&'static str")]
+pub enum Supports {
+    Ends(Ends),
+    Faces(Conditions),
+}
+
+impl Supports {
+    pub fn name(self) -> &'static str {
+        match self {
+            Supports::Ends(ends) => ends.name(),
+            Supports::Faces(conditions) => conditions.name(),
+        }
+    }
+}
+
+impl Default for Supports {
+    fn default() -> Self {
+        Supports::Ends(Ends::Free)
+    }
+}
+
+/// Reads and writes an enum as the word that its `name` gives, one of a fixed list.
+macro_rules! words {
+    ($kind:ty, [$($value:expr),+]) => {
+        impl From<$kind> for &'static str {
+            fn from(value: $kind) -> Self {
+                value.name()
+            }
+        }
+
+        impl TryFrom<String> for $kind {
+            type Error = String;
+
+            fn try_from(word: String) -> Result<Self, String> {
+                let all = [$($value),+];
+                all.into_iter().find(|value| value.name() == word).ok_or_else(|| {
+                    let names = all.map(<$kind>::name).join(", ");
+                    format!("expected one of {names}, found `{word}`")
+                })
+            }
+        }
+    };
+}
+
+words!(
+    CellType,
+    [
+        CellType::Lattice(Structure::Sc),
+        CellType::Lattice(Structure::Bcc),
+        CellType::Lattice(Structure::Fcc),
+        CellType::Hex8
+    ]
+);
+words!(
+    BoundaryRule,
+    [
+        BoundaryRule::FIRM,
+        BoundaryRule::FLOPPY,
+        BoundaryRule::GRADED,
+        BoundaryRule::Ffb,
+        BoundaryRule::Extrapolated
+    ]
+);
+words!(
+    Supports,
+    [
+        Supports::Ends(Ends::Free),
+        Supports::Ends(Ends::Bonded),
+        Supports::Faces(Conditions::Kinematic),
+        Supports::Faces(Conditions::Mixed)
+    ]
+);
+
+/// All that a row follows from. Rows with equal settings are of the same solve.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Settings {
+    pub scan: String,
+    pub method: Method,
+    pub structure: CellType,
+    /// None for voxel FE.
+    pub boundary: Option<BoundaryRule>,
+    /// Lattice parameter, or element size for voxel FE.
+    pub lp_mm: f64,
+    /// Offset of the lattice.
+    pub registration_mm: Option<[f64; 3]>,
+    /// Voxel edges.
+    pub voxel_mm: [f64; 3],
+    /// The bone's mean where `material` is given.
+    pub young_mpa: f64,
+    pub poisson: f64,
+    pub load: Load,
+    pub supports: Supports,
+    pub axis: Axis,
+    pub strain: f64,
+    /// 0 for end planes.
+    pub grip_mm: f64,
+    pub tv_definition: String,
+    pub tv_mm3: f64,
+    pub bv_tv: f64,
+    /// Relative algebraic error allowed in the headline.
+    pub tolerance: Option<f64>,
+    /// The law by which tissue differs from voxel to voxel.
+    pub material: Option<String>,
+}
+
+impl Settings {
+    /// True for a value that follows from other rows, without a solve of its own.
+    pub fn is_derived(&self) -> bool {
+        self.boundary.is_some_and(BoundaryRule::is_derived)
+    }
+
+    /// The same of any boundary.
+    pub fn without_boundary(&self) -> Settings {
+        Settings {
+            boundary: None,
+            ..self.clone()
+        }
+    }
+
+    /// The same of any resolution, place of the lattice and accuracy of the solver.
+    pub fn without_resolution(&self) -> Settings {
+        Settings {
+            lp_mm: 0.0,
+            registration_mm: None,
+            tolerance: None,
+            ..self.clone()
+        }
+    }
+}

@@ -67,8 +67,25 @@ pub struct Specimen {
     pub tv_mm3: f64,
     /// How TV was defined, in words ("box", "cylinder d=10 mm", "mask FILE").
     pub tv_definition: String,
-    /// Values of the scan, on the mask's grid, where its tissue is to differ from voxel to voxel; not read in pores.
+    /// Smoothed values of the scan, on the mask's grid: tissue that differs from voxel to voxel, and where the surface lies
+    /// between voxels. None where nothing needs them.
     pub grey: Option<Volume<f32>>,
+    /// How `bone` follows from `grey`. None: the surface within a voxel is a guess (a mask, labels).
+    pub threshold: Option<Threshold>,
+}
+
+/// What makes bone of smoothed grey values.
+#[derive(Debug, Clone)]
+pub struct Threshold {
+    /// Bone lies in `lower..=upper`.
+    pub lower: f32,
+    pub upper: f32,
+    /// 1 inside the volume of interest; None: the whole grid.
+    pub inside: Option<Volume<u8>>,
+    /// Keep all bone, not only the largest 6-connected component.
+    pub keep_all: bool,
+    /// σ in voxels of all blur between the body and `grey` that is known: the scanner's and the smoothing.
+    pub blur_voxels: Option<f64>,
 }
 
 impl Specimen {

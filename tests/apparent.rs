@@ -31,6 +31,7 @@ fn specimen(bone: Volume<u8>) -> Specimen {
         tv_mm3,
         tv_definition: "box".into(),
         grey: None,
+        threshold: None,
     }
 }
 

@@ -23,6 +23,7 @@ fn block() -> Specimen {
         bone: Volume::from_vec(grid, vec![1; grid.len()]),
         tv_definition: "box".into(),
         grey: Some(Volume::from_vec(grid, grey.collect())),
+        threshold: None,
     }
 }
 

@@ -44,6 +44,7 @@ pub fn irregular_specimen() -> Specimen {
         tv_mm3,
         tv_definition: "box".into(),
         grey: None,
+        threshold: None,
     }
 }
 

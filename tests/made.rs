@@ -14,5 +14,6 @@ pub fn specimen(n: [usize; 3], h: [f64; 3], bone: impl Fn([usize; 3]) -> bool) -
         bone: Volume::from_vec(grid, voxels),
         tv_definition: "box".into(),
         grey: None,
+        threshold: None,
     }
 }

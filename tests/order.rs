@@ -83,6 +83,7 @@ fn block(n: usize) -> Specimen {
         tv_mm3: 1.0,
         tv_definition: "box".into(),
         grey: None,
+        threshold: None,
     }
 }
 

@@ -23,6 +23,7 @@ fn block() -> Specimen {
         tv_mm3: 0.512,
         tv_definition: "box".into(),
         grey: None,
+        threshold: None,
     }
 }
 

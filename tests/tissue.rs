@@ -23,6 +23,7 @@ fn labelled(n: [usize; 3], h: f64, cortical: impl Fn([usize; 3]) -> bool) -> Spe
         bone: Volume::from_vec(grid, vec![1; grid.len()]),
         tv_definition: "box".into(),
         grey: Some(Volume::from_vec(grid, grey.collect())),
+        threshold: None,
     }
 }
 

@@ -76,9 +76,15 @@ pub struct SegmentSettings {
     /// Keep every voxel, not only the largest connected piece
     #[arg(long)]
     keep_all: bool,
-    /// Also keep the grey values of bone in DIR/grey.nii.gz, for moduli that follow them (`solve --material`)
-    #[arg(long)]
+    /// Kept for old scripts: grey values are kept anyway
+    #[arg(long, hide = true)]
     keep_grey: bool,
+    /// Do not keep DIR/grey.nii.gz, the smoothed values of the scan, which `solve --refine`, `--error` and `--material` read
+    #[arg(long, conflicts_with = "keep_grey")]
+    no_grey: bool,
+    /// Standard deviation of the scanner's blur in voxels, where it is known, without the smoothing: stated errors use it
+    #[arg(long, value_name = "VOXELS", value_parser = words::number)]
+    blur_voxels: Option<f64>,
     /// Also measure Tb.Th and Tb.Sp (sphere fitting), Conn.D, and DA by mean intercept lengths; takes longer
     #[arg(long)]
     morphometry: bool,
@@ -102,6 +108,8 @@ impl SegmentSettings {
             params.labels.clone_from(&self.labels);
         }
         params.keep_grey |= self.keep_grey;
+        params.no_grey |= self.no_grey;
+        params.blur_voxels = self.blur_voxels.or(params.blur_voxels);
         params.spacing_mm = self.spacing.or(params.spacing_mm);
         params.units = self.units.or(params.units);
         params.lower = self.lower.or(params.lower);

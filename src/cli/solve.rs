@@ -7,7 +7,7 @@ use bonepd_ct::error::Result;
 use bonepd_ct::grid::Axis;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::apparent::fields::Field;
-use bonepd_ct::pipeline::apparent::{Conditions, Ends, Load, Method, SolveParams};
+use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, SolveParams};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -25,7 +25,7 @@ pub struct SolveArgs {
     lattice: LatticeSettings,
     /// Choose method and resolution so that the stated error, algebraic and discretisation, stays below this, as 3% or
     /// 0.03; exit 1 where it cannot be met
-    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "coarsen", "lp", "boundary", "structure"])]
+    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "lp", "boundary", "structure"])]
     error: Option<f64>,
     /// voxel-fe: also write the model for another program: inp (CalculiX, Abaqus)
     #[arg(long, value_name = "FORMAT", value_parser = ["inp"])]
@@ -68,12 +68,19 @@ pub struct SolveSettings {
     /// Algebraic error allowed in the modulus, as 0.1% or 0.001 [default: 0.1%]
     #[arg(long, value_name = "ERROR", value_parser = words::fraction)]
     tolerance: Option<f64>,
-    /// voxel-fe: split each voxel into N³ elements
+    /// voxel-fe: N³ elements a voxel. Grey values are interpolated and thresholded again; the voxels of a mask are split
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "coarsen")]
     refine: Option<u16>,
+    /// voxel-fe: split each voxel of the mask into N³ elements, also of a grey scan: converges to the voxel staircase
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), conflicts_with_all = ["coarsen", "refine"])]
+    refine_mask: Option<u16>,
     /// voxel-fe: one element per N³ voxels
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     coarsen: Option<u16>,
+    /// What becomes of N³ voxels: threshold (bone where at least half of them is), or fraction (the modulus times the bone
+    /// fraction) [default: threshold]
+    #[arg(long, value_name = "RULE", value_parser = words::choice::<CoarsenBy>(&["threshold", "fraction"]), requires = "coarsen")]
+    coarsen_by: Option<CoarsenBy>,
     /// Also count mechanisms (motions that cost next to no energy); takes a factorisation, for small models
     #[arg(long)]
     mechanisms: bool,
@@ -106,7 +113,13 @@ impl SolveSettings {
         params.conditions = self.conditions.unwrap_or(params.conditions);
         params.axis = self.axis.unwrap_or(params.axis);
         params.tolerance = self.tolerance.unwrap_or(params.tolerance);
-        params.refine = self.refine.map_or(params.refine, usize::from);
+        let refine = self.refine.or(self.refine_mask);
+        params.refine = refine.map_or(params.refine, usize::from);
+        params.refine_mask = match refine {
+            Some(_) => self.refine_mask.is_some(),
+            None => params.refine_mask,
+        };
+        params.coarsen_by = self.coarsen_by.unwrap_or(params.coarsen_by);
         params.coarsen = self.coarsen.map_or(params.coarsen, usize::from);
         params.mechanisms |= self.mechanisms;
         if !self.fields.is_empty() {

@@ -61,7 +61,7 @@ pub fn lattice(
     let factors = match exports.tissue.material {
         None => None,
         Some(_) => {
-            specimen.grey = specimen::load_grey(dir, &specimen.bone)?;
+            specimen::add_grey(dir, &mut specimen)?;
             match Tissue::of(&specimen, &exports.tissue)? {
                 Tissue::Uniform(solid) => Some((solid.young_mpa, None)),
                 Tissue::Mixed(mixed) => Some((mixed.mean_mpa, Some(mixed.factor))),

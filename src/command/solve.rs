@@ -100,8 +100,8 @@ pub fn solve(
 /// With grey values where the material asks for them.
 fn loaded(dir: &Path, params: &SolveParams) -> Result<Specimen> {
     let mut specimen = load(dir)?;
-    if params.material.is_some() {
-        specimen.grey = specimen::load_grey(dir, &specimen.bone)?;
+    if params.needs_grey() {
+        specimen::add_grey(dir, &mut specimen)?;
     }
     Ok(specimen)
 }

@@ -3,14 +3,16 @@
 use crate::error::{Error, Result};
 use crate::image::{nifti, scan};
 use crate::io::atomic;
-use crate::pipeline::segment::{SegmentParams, SegmentSummary};
-use crate::volume::{Specimen, Volume};
+use crate::pipeline::segment::{SegmentParams, SegmentSummary, Surface};
+use crate::volume::{Specimen, Threshold, Volume};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 pub const MASK: &str = "mask.nii.gz";
 pub const RECORD: &str = "segment.json";
 pub const GREY: &str = "grey.nii.gz";
+/// The volume of interest, where it is not the whole box.
+pub const VOI: &str = "voi.nii.gz";
 pub const PICTURE: &str = "segment.png";
 
 /// `segment.json`: what was segmented, how, and what came out; enough to repeat it.
@@ -44,6 +46,11 @@ pub fn write(dir: &Path, specimen: &Specimen, record: &SegmentRecord) -> Result<
     match &specimen.grey {
         Some(grey) => nifti::write(&dir.join(GREY), grey)?,
         None => drop(std::fs::remove_file(dir.join(GREY))),
+    }
+    let inside = specimen.threshold.as_ref().and_then(|t| t.inside.as_ref());
+    match inside.filter(|_| specimen.grey.is_some()) {
+        Some(inside) => nifti::write(&dir.join(VOI), inside)?,
+        None => drop(std::fs::remove_file(dir.join(VOI))),
     }
     let json = serde_json::to_string_pretty(record).expect("records are plain data");
     atomic::write(&dir.join(RECORD), json + "\n")
@@ -86,27 +93,53 @@ pub fn load(dir: &Path) -> Result<Specimen> {
         tv_mm3: record.results.tv_mm3,
         tv_definition: record.results.tv_definition,
         grey: None,
+        threshold: None,
     })
 }
 
-/// The values of bone voxels that `segment` kept in `dir`; None where it was not asked to.
-pub fn load_grey(dir: &Path, bone: &Volume<u8>) -> Result<Option<Volume<f32>>> {
+/// Gives a specimen the grey values that `segment` kept in `dir`, and how its bone follows from them. Without kept values
+/// it stays as it is.
+///
+/// # Errors
+/// Values on another grid than the mask's, unreadable files.
+pub fn add_grey(dir: &Path, specimen: &mut Specimen) -> Result<()> {
     let path = dir.join(GREY);
     if !path.exists() {
-        return Ok(None);
+        return Ok(());
     }
-    let grey = scan::read_as_stored(&path, bone.grid.spacing_mm)?;
-    if grey.grid.n != bone.grid.n {
+    specimen.grey = Some(on_grid_of(&specimen.bone, &path)?);
+    let Some(record) = record(dir).filter(|r| r.results.surface == Surface::Grey) else {
+        return Ok(());
+    };
+    let voi = dir.join(VOI);
+    let inside = match voi.exists() {
+        true => Some(mask_of(&on_grid_of(&specimen.bone, &voi)?)),
+        false => None,
+    };
+    let (lower, upper) = (record.results.lower, record.results.upper);
+    specimen.threshold = Some(Threshold {
+        lower: lower.map_or(f32::NEG_INFINITY, |v| v as f32),
+        upper: upper.map_or(f32::INFINITY, |v| v as f32),
+        inside,
+        keep_all: record.settings.keep_all,
+        blur_voxels: record.settings.all_blur_voxels(),
+    });
+    Ok(())
+}
+
+fn on_grid_of(bone: &Volume<u8>, path: &Path) -> Result<Volume<f32>> {
+    let volume = scan::read_as_stored(path, bone.grid.spacing_mm)?;
+    if volume.grid.n != bone.grid.n {
         return Err(Error::file(
-            &path,
+            path,
             format!(
                 "has {:?} voxels where the mask has {:?}",
-                grey.grid.n, bone.grid.n
+                volume.grid.n, bone.grid.n
             ),
             "segment the scan again",
         ));
     }
-    Ok(Some(grey))
+    Ok(volume)
 }
 
 /// A mask from any image: non-zero is inside.

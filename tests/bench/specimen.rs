@@ -22,6 +22,7 @@ pub fn waves(n: usize, wave: f64, solid: f64) -> Specimen {
         bone: Volume::from_vec(grid, voxels),
         tv_definition: "box".into(),
         grey: None,
+        threshold: None,
     }
 }
 

@@ -76,6 +76,53 @@ impl SiteFields {
     }
 }
 
+impl Recorded {
+    /// The same on the scan's grid, from elements of another size: the mean of a voxel's elements where they are finer, that
+    /// of the element around the voxel's centre where they are coarser.
+    pub fn onto(self, scan: &Volume<u8>) -> Recorded {
+        let fields = self.fields.into_iter().map(|field| FieldVolume {
+            name: field.name,
+            values: onto(&field.values, scan),
+        });
+        Recorded {
+            fields: fields.collect(),
+            ..self
+        }
+    }
+}
+
+fn onto(values: &Volume<f32>, scan: &Volume<u8>) -> Volume<f32> {
+    let (from, to) = (values.grid, scan.grid);
+    let mut out = vec![0f32; to.len()];
+    if from.n[0] >= to.n[0] {
+        let [fx, fy, _] = from.n;
+        let factor: [usize; 3] = std::array::from_fn(|a| from.n[a] / to.n[a]);
+        let share = 1.0 / factor.iter().product::<usize>() as f32;
+        for (e, value) in values.as_slice().iter().enumerate() {
+            let at = [
+                e % fx / factor[0],
+                e / fx % fy / factor[1],
+                e / (fx * fy) / factor[2],
+            ];
+            out[to.index(at)] += share * value;
+        }
+    } else {
+        let around = |i: usize, a: usize| ((2 * i + 1) * from.n[a]) / (2 * to.n[a]);
+        let [sx, sy, _] = to.n;
+        for (v, out) in out
+            .iter_mut()
+            .enumerate()
+            .filter(|(v, _)| scan.as_slice()[*v] != 0)
+        {
+            let at = [v % sx, v / sx % sy, v / (sx * sy)];
+            *out = values.as_slice()[from.index([0, 1, 2].map(|a| around(at[a], a)))];
+        }
+    }
+    let mut volume = Volume::from_vec(to, out);
+    volume.affine = scan.affine;
+    volume
+}
+
 /// Fields and failure load of a solved model, as far as the settings ask for them.
 pub fn record(
     model: &Bricks,

@@ -11,7 +11,7 @@ use crate::grid::Grid;
 use crate::mask::resample;
 use crate::pipeline::apparent::bricks::LEAST_FRACTION;
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::apparent::{Conditions, Load, Method, SolveParams};
+use crate::pipeline::apparent::{CoarsenBy, Conditions, Load, Method, SolveParams};
 use crate::pipeline::lattice::{Case, build_connected, build_of};
 use crate::solver::amg::AmgParams;
 use crate::volume::{Specimen, Volume};
@@ -75,7 +75,8 @@ fn boxes(sites: &Sites) -> usize {
 /// The same for voxel elements.
 pub fn of_voxel_fe(specimen: &Specimen, params: &SolveParams) -> f64 {
     let grid = &specimen.bone.grid;
-    let differing = params.coarsen > 1 || params.material.is_some();
+    let by_fraction = params.coarsen > 1 && params.coarsen_by == CoarsenBy::Fraction;
+    let differing = by_fraction || params.material.is_some();
     let counts = match params.coarsen {
         1 => Counts::of(&specimen.bone),
         factor => {
@@ -210,6 +211,7 @@ mod tests {
         let specimen = Specimen {
             name: "speck".into(),
             grey: None,
+            threshold: None,
             bone: Volume::from_vec(grid, voxels),
             tv_mm3: 1.0,
             tv_definition: "box".into(),

@@ -6,6 +6,7 @@ pub mod lattice;
 pub mod mechanisms;
 pub mod memory;
 mod mixed_tissue;
+pub mod resolution;
 pub mod solved;
 pub mod stiffness;
 mod stress;
@@ -19,6 +20,17 @@ use crate::physics::material::Material;
 use crate::pipeline::apparent::fields::Field;
 pub use crate::result::settings::{Conditions, Ends, Load, Method};
 use serde::{Deserialize, Serialize};
+
+/// What becomes of a block of voxels that one element covers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "lowercase")]
+pub enum CoarsenBy {
+    /// Bone where at least half of it is bone, else pore.
+    #[default]
+    Threshold,
+    /// An element whose modulus is that of bone times its bone fraction.
+    Fraction,
+}
 
 /// Settings of `solve`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,8 +55,11 @@ pub struct SolveParams {
     pub max_iterations: usize,
     /// voxel-fe: each voxel becomes this many elements along every axis.
     pub refine: usize,
-    /// voxel-fe: this many voxels along every axis become one element, bone fractions kept as factors of its modulus.
+    /// Split the mask's voxels where `refine` would interpolate grey values: elements of the voxel staircase.
+    pub refine_mask: bool,
+    /// voxel-fe: this many voxels along every axis become one element.
     pub coarsen: usize,
+    pub coarsen_by: CoarsenBy,
     /// Count mechanisms, too; takes a factorisation.
     pub mechanisms: bool,
     /// Fields to write.
@@ -69,7 +84,9 @@ impl Default for SolveParams {
             tolerance: 1e-3,
             max_iterations: 200_000,
             refine: 1,
+            refine_mask: false,
             coarsen: 1,
+            coarsen_by: CoarsenBy::default(),
             mechanisms: false,
             fields: Vec::new(),
             pistoia: None,
@@ -78,6 +95,11 @@ impl Default for SolveParams {
 }
 
 impl SolveParams {
+    /// Whether grey values of the scan are needed beside its mask.
+    pub fn needs_grey(&self) -> bool {
+        self.material.is_some() || (self.refine > 1 && !self.refine_mask)
+    }
+
     /// Refuses what is no elastic material, no load or no accuracy.
     pub fn check(&self) -> Result<()> {
         let rules = [

@@ -7,6 +7,7 @@ use crate::operator::Operator;
 use crate::operator::held::Held;
 use crate::par::{CHUNK, dot, sum_chunks};
 use crate::pipeline::apparent::bricks::{Bricks, Keep};
+use crate::pipeline::apparent::resolution::{one_element_a_voxel, resolved};
 use crate::pipeline::apparent::{Conditions, SolveParams};
 use crate::solver::amg::{Amg, AmgParams};
 use crate::solver::cg::fallback::minimise_or_fall_back;
@@ -62,6 +63,19 @@ pub fn solve_stiffness(
             "segment with --voi box and a --crop inside the specimen",
         ));
     }
+    if let Some(resolved) = resolved(specimen, params)? {
+        return of_faces(&resolved, &one_element_a_voxel(params), &mut observe);
+    }
+    of_faces(specimen, params, &mut observe)
+}
+
+/// The same for the elements that follow from a specimen's voxels alone.
+fn of_faces(
+    specimen: &Specimen,
+    params: &SolveParams,
+    observe: &mut impl FnMut(usize, CgStep),
+) -> Result<Stiffness> {
+    let volume = specimen.bone.grid.size_mm().iter().product::<f64>();
     let model = Bricks::new(specimen, params, Keep::AtFaces)?;
     let mesh = model.mesh();
     let mut sum = Stiffness {

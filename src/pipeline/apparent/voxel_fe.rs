@@ -10,6 +10,7 @@ use crate::pipeline::apparent::bricks::{Bricks, Keep};
 use crate::pipeline::apparent::fields;
 use crate::pipeline::apparent::fields::Recorded;
 use crate::pipeline::apparent::mechanisms::mechanisms;
+use crate::pipeline::apparent::resolution::{one_element_a_voxel, resolved};
 use crate::pipeline::apparent::solved::{Moduli, Solved};
 use crate::pipeline::apparent::{Ends, Load, SolveParams};
 use crate::result::settings::{CellType, Method, Settings};
@@ -34,7 +35,7 @@ pub fn solve_voxels(
 pub fn solve_recorded(
     specimen: &Specimen,
     params: &SolveParams,
-    observe: impl FnMut(CgStep),
+    mut observe: impl FnMut(CgStep),
 ) -> Result<(Solved, Recorded)> {
     params.check()?;
     if params.load == Load::Stiffness {
@@ -44,6 +45,20 @@ pub fn solve_recorded(
             "call solve_stiffness",
         ));
     }
+    if let Some(resolved) = resolved(specimen, params)? {
+        let own = one_element_a_voxel(params);
+        let (solved, recorded) = solve_resolved(&resolved, &own, &mut observe)?;
+        return Ok((solved, recorded.onto(&specimen.bone)));
+    }
+    solve_resolved(specimen, params, &mut observe)
+}
+
+/// Solves the elements that follow from a specimen's voxels alone.
+fn solve_resolved(
+    specimen: &Specimen,
+    params: &SolveParams,
+    observe: &mut impl FnMut(CgStep),
+) -> Result<(Solved, Recorded)> {
     let model = Bricks::new(specimen, params, Keep::BetweenGrips)?;
     let mesh = model.mesh();
     let grips = Planes::within(&mesh.grid, params.axis, params.grip_mm)?;

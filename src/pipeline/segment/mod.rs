@@ -8,19 +8,20 @@ mod window;
 
 pub use params::{Align, AlignBox, SegmentParams, Voi};
 pub use place::Rotation;
-pub use summary::SegmentSummary;
+pub use summary::{SegmentSummary, Surface};
 
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::mask::components::Components;
 use crate::mask::ends;
+use crate::mask::voi::Inside;
 use crate::measure::morphometry::morphometry;
 use crate::measure::thickness::plate_thickness_mm;
-use crate::volume::{Specimen, Volume};
+use crate::volume::{Specimen, Threshold, Volume};
 use place::{Placed, place};
 use region::inside;
 use std::borrow::Cow;
-use window::{bone_of, count, no_label, nothing_selected, of_bone};
+use window::{bone_of, count, has_grey_values, no_label, nothing_selected, smoothed};
 
 /// A segmented scan with its numbers.
 #[derive(Debug, Clone)]
@@ -63,9 +64,10 @@ pub fn segment<'a>(
     let tv_mm3 = inside.tv_mm3(&grid);
     let specimen = Specimen {
         name: name.into(),
+        threshold: threshold_of(&placed, params, &inside, grid),
         grey: params
             .keeps_grey()
-            .then(|| of_bone(&placed.scan, &found.bone)),
+            .then(|| smoothed(&placed.scan, params.gaussian_voxels, &placed.grey)),
         bone: found.bone,
         tv_mm3,
         tv_definition,
@@ -76,6 +78,10 @@ pub fn segment<'a>(
         lower: placed.window.0,
         upper: placed.window.1,
         threshold: params.threshold().into(),
+        surface: match specimen.threshold {
+            Some(_) => Surface::Grey,
+            None => Surface::Mask,
+        },
         grey_min: f64::from(placed.grey.min),
         grey_max: f64::from(placed.grey.max),
         non_finite_voxels: placed.grey.non_finite,
@@ -141,6 +147,26 @@ fn find(placed: &Placed, params: &SegmentParams) -> Result<Found> {
         outside,
         components,
         removed,
+    })
+}
+
+/// How bone follows from the kept values; None for labels and masks, whose surface within a voxel is a guess.
+fn threshold_of(
+    placed: &Placed,
+    params: &SegmentParams,
+    inside: &Inside,
+    grid: Grid,
+) -> Option<Threshold> {
+    if !params.labels.is_empty() || !has_grey_values(&placed.scan) {
+        return None;
+    }
+    let (lower, upper) = placed.window;
+    Some(Threshold {
+        lower: lower.map_or(f32::NEG_INFINITY, |v| v as f32),
+        upper: upper.map_or(f32::INFINITY, |v| v as f32),
+        inside: inside.mask(grid),
+        keep_all: params.keep_all,
+        blur_voxels: params.all_blur_voxels(),
     })
 }
 

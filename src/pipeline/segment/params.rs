@@ -74,8 +74,12 @@ pub struct SegmentParams {
     pub plane_cut_mm: Option<f64>,
     /// Keep every voxel, not only the largest 6-connected component.
     pub keep_all: bool,
-    /// Also keep the values of bone voxels, for moduli that follow them.
+    /// Kept for old recipes: values are kept anyway.
     pub keep_grey: bool,
+    /// Keep no grey values beside the mask.
+    pub no_grey: bool,
+    /// σ of the scanner's blur in voxels, where it is known; without the smoothing.
+    pub blur_voxels: Option<f64>,
     /// Also measure Tb.Th, Tb.Sp, Conn.D and DA of the mask.
     pub morphometry: bool,
 }
@@ -98,9 +102,15 @@ impl SegmentParams {
         !self.otsu && (self.lower.is_some() || self.upper.is_some())
     }
 
-    /// Whether the values of bone voxels are kept beside the mask.
+    /// Whether grey values are kept beside the mask.
     pub fn keeps_grey(&self) -> bool {
-        self.keep_grey || !self.labels.is_empty()
+        self.keep_grey || !self.no_grey
+    }
+
+    /// σ of the scanner's blur and of the smoothing together, where the scanner's is known.
+    pub fn all_blur_voxels(&self) -> Option<f64> {
+        self.blur_voxels
+            .map(|blur| blur.hypot(self.gaussian_voxels))
     }
 
     /// Refuses settings that contradict each other or cannot be used on any scan.
@@ -139,6 +149,22 @@ impl SegmentParams {
                     self.gaussian_voxels
                 ),
                 "0 is off; 0.5 to 1.2 is usual",
+            );
+        }
+        if self.keep_grey && self.no_grey {
+            return refuse(
+                "segment.no_grey",
+                "keep_grey and no_grey exclude each other".to_owned(),
+                "leave one of them out",
+            );
+        }
+        if let Some(blur) = self.blur_voxels
+            && !(0.0..=MAX_SIGMA).contains(&blur)
+        {
+            return refuse(
+                "segment.blur_voxels",
+                format!("expected a width of 0 to {MAX_SIGMA} voxels, found {blur}"),
+                "give σ of the scanner's point spread in voxels, 0.5 to 1 is usual",
             );
         }
         if let Some(spacing) = self.spacing_mm

@@ -14,6 +14,9 @@ pub struct SegmentSummary {
     pub upper: Option<f64>,
     /// `window`, `otsu` or `labels`.
     pub threshold: String,
+    /// What is known of the surface within a voxel.
+    #[serde(default)]
+    pub surface: Surface,
     /// Range of the finite grey values before smoothing.
     pub grey_min: f64,
     pub grey_max: f64,
@@ -43,6 +46,17 @@ pub struct SegmentSummary {
     #[serde(default)]
     pub morphometry: Option<Morphometry>,
     pub warnings: Vec<String>,
+}
+
+/// What a scan says of the bone's surface within a voxel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Surface {
+    /// Grey values say where it lies.
+    Grey,
+    /// A mask or labels: it is a guess.
+    #[default]
+    Mask,
 }
 
 /// Two mean intercept lengths nearer than this could as well be the other way round.

@@ -126,6 +126,34 @@ fn select(
     bone
 }
 
+/// The smoothed values of every voxel, on the scan's grid.
+pub(super) fn smoothed(scan: &Volume<f32>, sigma: f64, grey: &Grey) -> Volume<f32> {
+    if sigma == 0.0 && grey.non_finite == 0 {
+        return scan.clone();
+    }
+    let slabs = gaussian::map_slabs(scan, sigma, clean(grey), |_, values| values.to_vec());
+    let mut smooth = Volume::from_vec(scan.grid, slabs.concat());
+    smooth.affine = scan.affine;
+    smooth
+}
+
+/// Most values that a segmented image has: pore, and a few labels.
+const LABELS: usize = 4;
+
+/// Whether an image holds grey values, and not a mask or a few labels.
+pub(super) fn has_grey_values(scan: &Volume<f32>) -> bool {
+    let mut found: Vec<f32> = Vec::with_capacity(LABELS + 1);
+    for &v in scan.as_slice().iter().filter(|v| v.is_finite()) {
+        if !found.contains(&v) {
+            found.push(v);
+        }
+        if found.len() > LABELS {
+            return true;
+        }
+    }
+    false
+}
+
 pub(super) fn count(bone: &Volume<u8>) -> u64 {
     bone.as_slice()
         .par_chunks(1 << 16)
@@ -174,15 +202,4 @@ pub(super) fn no_label(scan: &Volume<f32>, labels: &[i32]) -> Error {
         ),
         "check the labels, or give a threshold if the scan holds grey values",
     )
-}
-
-/// The scan's values where there is bone, 0 elsewhere.
-pub(super) fn of_bone(scan: &Volume<f32>, bone: &Volume<u8>) -> Volume<f32> {
-    let voxels = scan.as_slice().par_iter().zip(bone.as_slice());
-    let values = voxels
-        .map(|(&v, &b)| if b == 0 { 0.0 } else { v })
-        .collect();
-    let mut grey = Volume::from_vec(scan.grid, values);
-    grey.affine = scan.affine;
-    grey
 }

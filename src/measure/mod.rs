@@ -9,4 +9,5 @@ pub mod morphometry;
 pub mod pistoia;
 pub mod spheres;
 pub mod stiffness;
+pub mod surface_energy;
 pub mod thickness;

@@ -30,6 +30,17 @@ pub fn bricks(
     stiffness: impl Fn(usize) -> (f32, u8) + Sync,
     u: &[[f64; 3]],
 ) -> Vec<Brick> {
+    sample(mesh, kinds, stiffness, u, 1)
+}
+
+/// The elements of every `step`-th row of a mesh: enough for means over many.
+pub fn sample(
+    mesh: &VoxelMesh,
+    kinds: &[Kind],
+    stiffness: impl Fn(usize) -> (f32, u8) + Sync,
+    u: &[[f64; 3]],
+    step: usize,
+) -> Vec<Brick> {
     let h = mesh.grid.spacing_mm;
     let matrices: Vec<ElementMatrix> = kinds
         .iter()
@@ -60,7 +71,8 @@ pub fn bricks(
         }
         found
     };
-    let all: Vec<Vec<Brick>> = mesh.segments.par_iter().map(segment).collect();
+    let rows = mesh.segments.par_iter().step_by(step.max(1));
+    let all: Vec<Vec<Brick>> = rows.map(segment).collect();
     all.into_iter().flatten().collect()
 }
 

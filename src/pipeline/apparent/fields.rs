@@ -5,7 +5,8 @@ use crate::discretisation::lattice::placement::Frame;
 use crate::error::Result;
 use crate::mask::resample;
 use crate::measure::pistoia::Failure;
-use crate::physics::hex8::fields::{Brick, Kind, bricks};
+use crate::measure::surface_energy::{Element, SurfaceEnergy, surface_energy};
+use crate::physics::hex8::fields::{Brick, Kind, bricks, sample};
 use crate::pipeline::apparent::SolveParams;
 use crate::pipeline::apparent::bricks::{Bricks, rule};
 use crate::pipeline::apparent::tissue::Tissue;
@@ -173,6 +174,35 @@ pub fn record(
         }
     }
     Ok(Recorded { fields, failure })
+}
+
+/// Elements that means of the surface's energy are taken over, about.
+const SAMPLED: usize = 200_000;
+
+/// How the modulus answers to the surface, from a sample of a solved model's elements.
+pub fn surface(model: &Bricks, kinds: &[Kind], u: &[[f64; 3]]) -> Option<SurfaceEnergy> {
+    let mesh = model.mesh();
+    let step = mesh.elements.div_ceil(SAMPLED);
+    let sampled = sample(mesh, kinds, |node| model.stiffness_of(node), u, step);
+    let mut filled = vec![false; mesh.grid.len()];
+    mesh.low_corner_elements()
+        .flatten()
+        .for_each(|element| filled[element] = true);
+    let [nx, ny, nz] = mesh.grid.n;
+    let free_faces = |e: usize| {
+        let at = [e % nx, e / nx % ny, e / (nx * ny)];
+        let beside = [(0, 1, nx), (1, nx, ny), (2, nx * ny, nz)];
+        let free = |(axis, stride, n): (usize, usize, usize)| {
+            let low = at[axis] > 0 && !filled[e - stride];
+            let high = at[axis] + 1 < n && !filled[e + stride];
+            usize::from(low) + usize::from(high)
+        };
+        beside.into_iter().map(free).sum()
+    };
+    surface_energy(sampled.iter().map(|brick| Element {
+        energy_density_mpa: f64::from(brick.energy_density_mpa),
+        free_faces: free_faces(brick.element),
+    }))
 }
 
 /// Elements' values by voxel of the scan: the mean of a voxel's elements, or that of the element around its centre.

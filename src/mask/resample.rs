@@ -34,11 +34,50 @@ pub fn coarsen_values(mask: &Volume<u8>, factor: usize, values: &[f32]) -> Volum
     coarsened(mask, factor, |voxel| values[voxel])
 }
 
+/// Bone fractions of blocks twice as wide about the same centres; beyond the box nothing counts.
+pub fn coarsen_wide(mask: &Volume<u8>, factor: usize) -> Volume<f32> {
+    let blocks = blocks(mask.grid, factor);
+    let wide = |a: usize| wide_shares(mask.grid.n[a], blocks.n[a]);
+    let bone = |voxel: usize| f32::from(mask.as_slice()[voxel] != 0);
+    means(mask.grid, blocks, std::array::from_fn(wide), bone)
+}
+
+/// Means of values over voxels `factor` times as long.
+pub fn block_means(values: &Volume<f32>, factor: usize) -> Volume<f32> {
+    let blocks = blocks(values.grid, factor);
+    let of = |a: usize| shares(values.grid.n[a], blocks.n[a]);
+    let value = |voxel: usize| values.as_slice()[voxel];
+    means(values.grid, blocks, std::array::from_fn(of), value)
+}
+
 fn coarsened(mask: &Volume<u8>, factor: usize, value: impl Fn(usize) -> f32 + Sync) -> Volume<f32> {
-    let fine = mask.grid;
-    let n: [usize; 3] = std::array::from_fn(|a| fine.n[a].div_ceil(factor));
-    let shares: [Vec<Vec<(usize, f32)>>; 3] = std::array::from_fn(|a| shares(fine.n[a], n[a]));
+    let blocks = blocks(mask.grid, factor);
+    let of = |a: usize| shares(mask.grid.n[a], blocks.n[a]);
     let voxels = mask.as_slice();
+    let bone = |voxel: usize| match voxels[voxel] {
+        0 => 0.0,
+        _ => value(voxel),
+    };
+    means(mask.grid, blocks, std::array::from_fn(of), bone)
+}
+
+/// The grid of voxels `factor` times as long in the same box.
+fn blocks(fine: Grid, factor: usize) -> Grid {
+    let n: [usize; 3] = std::array::from_fn(|a| fine.n[a].div_ceil(factor));
+    let size = fine.size_mm();
+    Grid::new(n, std::array::from_fn(|a| size[a] / n[a] as f64))
+}
+
+/// Voxels of a fine axis and their weights, for each voxel of the coarse axis.
+type Shares = Vec<Vec<(usize, f32)>>;
+
+fn means(
+    fine: Grid,
+    blocks: Grid,
+    shares: [Shares; 3],
+    value: impl Fn(usize) -> f32 + Sync,
+) -> Volume<f32> {
+    let n = blocks.n;
     let mut coarse = vec![0f32; n.iter().product()];
     coarse
         .par_chunks_mut((n[0] * n[1]).max(1))
@@ -49,20 +88,36 @@ fn coarsened(mask: &Volume<u8>, factor: usize, value: impl Fn(usize) -> f32 + Sy
                     for &(fy, wy) in &shares[1][i / n[0]] {
                         let start = (fz * fine.n[1] + fy) * fine.n[0];
                         let across = shares[0][i % n[0]].iter();
-                        let bone = across.filter(|s| voxels[start + s.0] != 0);
-                        let sum: f32 = bone.map(|s| s.1 * value(start + s.0)).sum();
+                        let sum: f32 = across.map(|s| s.1 * value(start + s.0)).sum();
                         *out += wz * wy * sum;
                     }
                 }
             }
         });
-    let size = fine.size_mm();
-    let spacing = std::array::from_fn(|a| size[a] / n[a] as f64);
-    Volume::from_vec(Grid::new(n, spacing), coarse)
+    Volume::from_vec(blocks, coarse)
+}
+
+/// As [`shares`], over twice the length of each interval about its middle, as far as there are fine ones.
+fn wide_shares(fine: usize, coarse: usize) -> Shares {
+    let ratio = fine as f64 / coarse as f64;
+    (0..coarse)
+        .map(|c| {
+            let (low, high) = ((c as f64 - 0.5) * ratio, (c as f64 + 1.5) * ratio);
+            let from = low.max(0.0).floor() as usize;
+            let to = (high.ceil() as usize).min(fine);
+            let inside = high.min(fine as f64) - low.max(0.0);
+            (from..to)
+                .map(|f| {
+                    let covered = high.min(f as f64 + 1.0) - low.max(f as f64);
+                    (f, (covered / inside) as f32)
+                })
+                .collect()
+        })
+        .collect()
 }
 
 /// For each of `coarse` equal intervals, the `fine` ones it covers, with the share of its length that each has.
-fn shares(fine: usize, coarse: usize) -> Vec<Vec<(usize, f32)>> {
+fn shares(fine: usize, coarse: usize) -> Shares {
     let ratio = fine as f64 / coarse as f64;
     (0..coarse)
         .map(|c| {

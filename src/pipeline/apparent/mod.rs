@@ -97,7 +97,9 @@ impl Default for SolveParams {
 impl SolveParams {
     /// Whether grey values of the scan are needed beside its mask.
     pub fn needs_grey(&self) -> bool {
-        self.material.is_some() || (self.refine > 1 && !self.refine_mask)
+        self.material.is_some()
+            || (self.refine > 1 && !self.refine_mask)
+            || (self.coarsen > 1 && self.coarsen_by == CoarsenBy::Threshold)
     }
 
     /// Refuses what is no elastic material, no load or no accuracy.

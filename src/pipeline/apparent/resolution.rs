@@ -2,12 +2,16 @@
 
 use crate::error::{Error, Result};
 use crate::mask::components::Components;
+use crate::mask::voi::Inside;
 use crate::mask::{resample, upsample};
 use crate::pipeline::apparent::{CoarsenBy, Method, SolveParams};
 use crate::volume::{Specimen, Threshold, Volume};
 
 /// Bone fraction of a block of voxels from which on it is bone.
 const HALF: f32 = 0.5;
+
+/// Bone fractions are sums of shares in single precision.
+const ROUNDING: f32 = 1e-5;
 
 /// A specimen whose voxels are the elements that the settings ask for, where that is another mask than its own; None where
 /// the elements follow from its voxels alone (as they are, split, or weighted by bone fractions).
@@ -24,7 +28,7 @@ pub fn resolved(specimen: &Specimen, params: &SolveParams) -> Result<Option<Spec
             _ => return Ok(None),
         }
     } else if params.coarsen > 1 && params.coarsen_by == CoarsenBy::Threshold {
-        coarsened(&specimen.bone, params.coarsen)
+        coarsened(specimen, params.coarsen)
     } else {
         return Ok(None);
     };
@@ -53,27 +57,48 @@ pub fn one_element_a_voxel(params: &SolveParams) -> SolveParams {
     }
 }
 
-/// Bone where at least half of a block of `factor`³ voxels is bone.
-fn coarsened(bone: &Volume<u8>, factor: usize) -> Volume<u8> {
-    let fractions = resample::coarsen(bone, factor);
-    // Shares are single precision: half of a block may miss by rounding.
-    let is_bone = |f: &f32| u8::from(*f >= HALF - 1e-5);
-    let voxels = fractions.as_slice().iter().map(is_bone).collect();
-    Volume::from_vec(fractions.grid, voxels)
+/// Bone where the mean of a block of `factor`³ voxels lies in the window: of grey values where they are known, else of the
+/// mask. A block of the mask that is bone to exactly one half is what the block twice as wide around it is.
+fn coarsened(specimen: &Specimen, factor: usize) -> Volume<u8> {
+    if let (Some(grey), Some(threshold)) = (&specimen.grey, &specimen.threshold) {
+        let means = resample::block_means(grey, factor);
+        let is_bone = |v: &f32| u8::from(*v >= threshold.lower && *v <= threshold.upper);
+        let voxels = means.as_slice().iter().map(is_bone).collect();
+        let bone = Volume::from_vec(means.grid, voxels);
+        let inside = threshold.inside.as_ref();
+        let inside = inside.map(|mask| at_least_half(mask, factor));
+        return kept(bone, inside.as_ref(), threshold.keep_all);
+    }
+    at_least_half(&specimen.bone, factor)
+}
+
+fn at_least_half(mask: &Volume<u8>, factor: usize) -> Volume<u8> {
+    let fractions = resample::coarsen(mask, factor);
+    let wider = resample::coarsen_wide(mask, factor);
+    let is_bone = |(f, wide): (&f32, &f32)| match (f - HALF).abs() < ROUNDING {
+        true => u8::from(*wide >= HALF),
+        false => u8::from(*f > HALF),
+    };
+    let voxels = fractions.as_slice().iter().zip(wider.as_slice());
+    Volume::from_vec(fractions.grid, voxels.map(is_bone).collect())
 }
 
 /// Grey values interpolated `factor` times as fine and thresholded again, inside the volume of interest, connected as the
 /// scan's own mask is.
 fn interpolated(grey: &Volume<f32>, threshold: &Threshold, factor: usize) -> Volume<u8> {
     let window = (threshold.lower, threshold.upper);
-    let mut bone = upsample::select_between(grey, factor, window);
-    if let Some(inside) = &threshold.inside {
-        let fine = resample::refine(inside, factor);
-        let outside = fine.as_slice().iter().map(|i| *i == 0);
-        let voxels = bone.values.iter_mut().zip(outside);
-        voxels.filter(|(_, out)| *out).for_each(|(b, _)| *b = 0);
+    let bone = upsample::select_between(grey, factor, window);
+    let inside = threshold.inside.as_ref();
+    let inside = inside.map(|mask| resample::refine(mask, factor));
+    kept(bone, inside.as_ref(), threshold.keep_all)
+}
+
+/// Bone inside the volume of interest; unless all is kept, its largest 6-connected component.
+fn kept(mut bone: Volume<u8>, inside: Option<&Volume<u8>>, keep_all: bool) -> Volume<u8> {
+    if let Some(inside) = inside {
+        Inside::Mask(inside).clear_outside(&mut bone);
     }
-    if !threshold.keep_all {
+    if !keep_all {
         let components = Components::of(&bone);
         if let Some(largest) = components.largest() {
             components.keep_only(largest, &mut bone);

@@ -2,6 +2,7 @@
 
 pub mod apparent;
 pub mod distance;
+pub mod edge_blur;
 pub mod fabric;
 #[cfg(test)]
 mod made;

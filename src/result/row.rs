@@ -31,6 +31,10 @@ pub struct Solution {
     pub e_app_stress_mpa: Option<f64>,
     pub algebraic_error_mpa: Option<f64>,
     pub discretization_error_mpa: Option<f64>,
+    /// What voxels, and the blur of the scan, leave open about the bone's surface.
+    pub shape_error_mpa: Option<f64>,
+    /// Relative change of E_app per relative change of bone volume, all of the surface moved by one length.
+    pub threshold_sensitivity: Option<f64>,
     pub wall_s: Option<f64>,
     pub peak_mib: Option<f64>,
     /// Motions that cost next to no energy, rigid motions of the whole apart; where `--mechanisms` asks for them.
@@ -83,6 +87,23 @@ impl Row {
         self.solved.as_ref().map_or([None, None], |s| {
             [s.algebraic_error_mpa, s.discretization_error_mpa]
         })
+    }
+
+    /// Everything that is stated of the modulus, in MPa: algebraic, discretisation and shape error. None unless the last two
+    /// are known; 0 where no bone carries load.
+    pub fn error_mpa(&self) -> Option<f64> {
+        if self.is_disconnected() {
+            return Some(0.0);
+        }
+        let solved = self.solved.as_ref()?;
+        let algebraic = solved.algebraic_error_mpa.unwrap_or(0.0);
+        Some(algebraic + solved.discretization_error_mpa? + solved.shape_error_mpa?)
+    }
+
+    /// The same over the modulus.
+    pub fn error(&self) -> Option<f64> {
+        let e_app_mpa = self.e_app_mpa().filter(|e| *e > 0.0)?;
+        Some(self.error_mpa()? / e_app_mpa).filter(|e| e.is_finite())
     }
 
     /// Whether no bone carries load from face to face: E_app is 0.

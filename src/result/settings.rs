@@ -222,6 +222,23 @@ words!(
     ]
 );
 
+/// Column `elements`: what voxel elements follow from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Elements {
+    /// One element a voxel of bone.
+    #[default]
+    Voxels,
+    /// Interpolated grey values, thresholded again.
+    InterpolatedGrey,
+    /// The mask's voxels, split: they converge to the voxel staircase.
+    SplitVoxels,
+    /// Means of blocks of voxels, thresholded.
+    BlockMeans,
+    /// Blocks of voxels, their moduli weighted by bone fraction.
+    BoneFractions,
+}
+
 /// All that a row follows from. Rows with equal settings are of the same solve.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Settings {
@@ -232,6 +249,8 @@ pub struct Settings {
     pub boundary: Option<BoundaryRule>,
     /// Lattice parameter, or element size for voxel FE.
     pub lp_mm: f64,
+    /// None for lattices.
+    pub elements: Option<Elements>,
     /// Offset of the lattice.
     pub registration_mm: Option<[f64; 3]>,
     /// Voxel edges.

@@ -38,6 +38,8 @@ pub struct FieldVolume {
 pub struct Recorded {
     pub fields: Vec<FieldVolume>,
     pub failure: Option<Failure>,
+    /// How the modulus answers to the surface; of voxel elements of one tissue.
+    pub surface: Option<SurfaceEnergy>,
 }
 
 /// What was asked for of a lattice, by site.
@@ -132,8 +134,18 @@ pub fn record(
     u: &[[f64; 3]],
     reaction_n: f64,
 ) -> Result<Recorded> {
+    let surface = match params.material {
+        Some(_) => None,
+        None => {
+            let nu = params.poisson;
+            surface(model, &[(params.young_mpa, nu, rule(nu))], u)
+        }
+    };
     if params.fields.is_empty() && params.pistoia.is_none() {
-        return Ok(Recorded::default());
+        return Ok(Recorded {
+            surface,
+            ..Recorded::default()
+        });
     }
     let kinds: Vec<Kind> = match Tissue::of(specimen, params)? {
         Tissue::Uniform(s) => vec![(s.young_mpa, s.poisson, rule(s.poisson))],
@@ -173,7 +185,11 @@ pub fn record(
             }
         }
     }
-    Ok(Recorded { fields, failure })
+    Ok(Recorded {
+        fields,
+        failure,
+        surface,
+    })
 }
 
 /// Elements that means of the surface's energy are taken over, about.

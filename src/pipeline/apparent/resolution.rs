@@ -5,6 +5,7 @@ use crate::mask::components::Components;
 use crate::mask::voi::Inside;
 use crate::mask::{resample, upsample};
 use crate::pipeline::apparent::{CoarsenBy, Method, SolveParams};
+use crate::result::settings::Elements;
 use crate::volume::{Specimen, Threshold, Volume};
 
 /// Bone fraction of a block of voxels from which on it is bone.
@@ -46,6 +47,19 @@ pub fn resolved(specimen: &Specimen, params: &SolveParams) -> Result<Option<Spec
         grey: None,
         threshold: None,
     }))
+}
+
+/// What the elements follow from.
+pub fn elements(specimen: &Specimen, params: &SolveParams) -> Elements {
+    let resolved = params.material.is_none();
+    let grey = specimen.grey.is_some() && specimen.threshold.is_some();
+    match (params.refine, params.coarsen, params.coarsen_by) {
+        (1, 1, _) => Elements::Voxels,
+        (1, _, CoarsenBy::Threshold) if resolved => Elements::BlockMeans,
+        (1, _, _) => Elements::BoneFractions,
+        _ if resolved && grey && !params.refine_mask => Elements::InterpolatedGrey,
+        _ => Elements::SplitVoxels,
+    }
 }
 
 /// The same settings for a specimen that is at its elements' resolution.

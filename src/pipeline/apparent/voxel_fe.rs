@@ -10,6 +10,7 @@ use crate::pipeline::apparent::bricks::{Bricks, Keep};
 use crate::pipeline::apparent::fields;
 use crate::pipeline::apparent::fields::Recorded;
 use crate::pipeline::apparent::mechanisms::mechanisms;
+use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::resolution::{one_element_a_voxel, resolved};
 use crate::pipeline::apparent::solved::{Moduli, Solved};
 use crate::pipeline::apparent::{Ends, Load, SolveParams};
@@ -209,6 +210,7 @@ pub fn label(key: Settings, specimen: &Specimen, params: &SolveParams) -> Settin
         structure: CellType::Hex8,
         boundary: None,
         lp_mm: edge * params.coarsen as f64 / params.refine as f64,
+        elements: Some(resolution::elements(specimen, params)),
         registration_mm: None,
         ..key
     }

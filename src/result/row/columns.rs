@@ -2,7 +2,7 @@
 
 use crate::grid::Axis;
 use crate::result::row::{FailureLoad, Marks, Row, Solution};
-use crate::result::settings::{BoundaryRule, CellType, Load, Method, Settings, Supports};
+use crate::result::settings::{BoundaryRule, CellType, Elements, Load, Method, Settings, Supports};
 use serde::{Deserialize, Serialize};
 
 /// A row as files hold it. What the columns mean is at the fields of [`Settings`], [`Solution`] and [`Marks`].
@@ -53,10 +53,21 @@ pub(super) struct Columns {
     tb_sp_mm: Option<f64>,
     conn_d_per_mm3: Option<f64>,
     da: Option<f64>,
+    #[serde(default)]
+    elements: Option<Elements>,
+    #[serde(default)]
+    shape_error_mpa: Option<f64>,
+    /// Algebraic, discretisation and shape error together.
+    #[serde(default)]
+    error_mpa: Option<f64>,
+    #[serde(default)]
+    threshold_sensitivity: Option<f64>,
 }
 
 impl From<Row> for Columns {
-    fn from(Row { key, solved, marks }: Row) -> Self {
+    fn from(row: Row) -> Self {
+        let error_mpa = row.error_mpa();
+        let Row { key, solved, marks } = row;
         let solved = solved.unwrap_or_default();
         Columns {
             scan: key.scan,
@@ -102,6 +113,10 @@ impl From<Row> for Columns {
             tb_sp_mm: marks.tb_sp_mm,
             conn_d_per_mm3: marks.conn_d_per_mm3,
             da: marks.da,
+            elements: key.elements,
+            shape_error_mpa: solved.shape_error_mpa,
+            error_mpa,
+            threshold_sensitivity: solved.threshold_sensitivity,
         }
     }
 }
@@ -116,6 +131,7 @@ impl TryFrom<Columns> for Row {
             structure: c.structure,
             boundary: c.boundary,
             lp_mm: c.lp_mm,
+            elements: c.elements,
             registration_mm: match c.registration {
                 Some(words) => Some(lengths("registration", &words)?),
                 None => None,
@@ -146,6 +162,8 @@ impl TryFrom<Columns> for Row {
             e_app_stress_mpa: c.e_app_stress_mpa,
             algebraic_error_mpa: c.algebraic_error_mpa,
             discretization_error_mpa: c.discretization_error_mpa,
+            shape_error_mpa: c.shape_error_mpa,
+            threshold_sensitivity: c.threshold_sensitivity,
             wall_s: c.wall_s,
             peak_mib: c.peak_mib,
             mechanisms: c.mechanisms,

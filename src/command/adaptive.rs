@@ -1,27 +1,24 @@
-//! Owns `solve --error`: resolutions tried from cheap to dear until the stated error meets its target.
+//! Owns `solve --error`: models from cheap to dear until the stated error meets its target.
 //!
-//! First three graded lattices (LP from the strut thickness to half of it), then pairs of voxel-FE solves whose elements
-//! differ by a factor of two, beginning at the coarsest pair that can be expected to suffice.
+//! One element a voxel first. Then, of a grey scan, finer elements of interpolated grey values, with what the step and a
+//! smoother image say of the shape. The best answer so far is kept. Lattices and coarser elements are not tried: a body whose
+//! cracks they bridge looks converged.
 
-use crate::command::ladder::{PAIRS, element_mm, suffices, voxel_fe};
-use crate::command::segment::load;
-use crate::command::solve::{in_words, solve};
+use crate::command::estimate;
+use crate::command::ladder::{COARSENED, REFINED, smoothed_again, voxel_fe};
+use crate::command::solve::{in_words, loaded, solve};
 use crate::error::Result;
 use crate::machine::session::Session;
 use crate::measure::thickness::plate_thickness_mm;
-use crate::pipeline::apparent::{Method, SolveParams};
-use crate::pipeline::lattice::{Boundary, LatticeParams, Structure};
+use crate::pipeline::apparent::SolveParams;
+use crate::pipeline::apparent::resolution::image;
+use crate::pipeline::lattice::LatticeParams;
 use crate::record::error_target_note::Missed;
 use crate::record::results::Results;
-use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
 use crate::result::row::Row;
+use crate::result::shape::{Image, Learnt, of_interpolated, state, surface};
+use crate::volume::Specimen;
 use std::path::Path;
-
-/// Lattice parameters tried, in strut thicknesses.
-const LP_OVER_THICKNESS: [f64; 3] = [1.0, 0.75, 0.5];
-
-/// Elements that a voxel-FE solve may have at most: some 8 GiB.
-const MOST_ELEMENTS: f64 = 2.5e7;
 
 /// What came of it.
 pub struct Found {
@@ -31,15 +28,14 @@ pub struct Found {
     pub met: bool,
 }
 
-/// Solves the specimen in `dir` until the algebraic and the discretisation error together are below `target` (0.03 is
-/// 3 %), and says which row it is. What was tried stands in the results.
+/// Solves the specimen in `dir` until the stated error is below `target` (0.03 is 3 %), and says which row it is. What was
+/// tried stands in the results.
 ///
 /// # Errors
 /// As [`solve`].
 pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session) -> Result<Found> {
-    let specimen = load(dir)?;
     if !session.dry_run {
-        // Of an earlier error asked for.
+        // Of an earlier target.
         Results::open(dir, false)?.renote(Missed::take_back)?;
     }
     if session.force && !session.dry_run {
@@ -50,104 +46,91 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         force: false,
         ..session.clone()
     };
-    let mut rows = Vec::new();
     let params = SolveParams {
         // A tenth of the whole error is left to the solver.
         tolerance: params.tolerance.min(0.1 * target),
         ..params.clone()
     };
-    let bone = &specimen.bone;
-    let Some(thickness) = plate_thickness_mm(bone) else {
-        // A block of bone without a surface: one element a voxel is exact.
-        rows = solve(
-            dir,
-            &LatticeParams::default(),
-            &voxel_fe(&params, 1, 1),
-            session,
-        )?;
-        return Ok(Found { rows, met: true });
-    };
-    let shortest = bone
-        .grid
-        .size_mm()
-        .into_iter()
-        .fold(f64::INFINITY, f64::min);
-    let lattices = LatticeParams {
-        structure: vec![Structure::Sc],
-        lp_mm: LP_OVER_THICKNESS
-            .map(|f| (1e4 * f * thickness.min(0.1 * shortest)).round() / 1e4)
-            .to_vec(),
-        boundary: vec![Boundary::Graded],
-        ..LatticeParams::default()
-    };
-    if lattices.lp_mm.iter().all(|lp| *lp > 0.0) {
-        let lattice = SolveParams {
-            method: Method::Lattice,
-            ..params.clone()
-        };
-        rows.extend(solve(dir, &lattices, &lattice, session)?);
-        if !session.dry_run && (meets(&rows, target) || rows.iter().all(Row::is_disconnected)) {
-            return finish(dir, rows, target, session);
-        }
-    }
-    let elements = bone.as_slice().iter().filter(|b| **b != 0).count() as f64;
-    let suffices = |pair| suffices(bone, pair, thickness, target);
-    let any = PAIRS.into_iter().any(suffices);
-    for (coarsen, refine) in PAIRS {
-        let element = element_mm(bone, (coarsen, refine));
-        // Where none can be expected to suffice, one element a voxel says how far one gets.
-        if !suffices((coarsen, refine)) && (any || (coarsen, refine) != (1, 1)) {
-            continue;
-        }
-        if elements * (refine as f64).powi(3) > MOST_ELEMENTS {
-            session.warn(format!(
-                "elements of {element:.4} mm would be {:.0} million, too many: the specimen must be cropped for a smaller error",
-                elements * (refine as f64).powi(3) / 1e6
-            ));
-            break;
-        }
-        let twice = if refine > 1 {
-            (1, refine / 2)
-        } else {
-            (2 * coarsen, 1)
-        };
-        let none = LatticeParams::default();
-        let pair = [twice, (coarsen, refine)];
-        let mut own = Vec::new();
-        for (coarsen, refine) in pair {
-            own.extend(solve(
-                dir,
-                &none,
-                &voxel_fe(&params, coarsen, refine),
-                session,
-            )?);
-        }
-        // Neighbouring pairs share a size.
-        let new = with_extrapolated(&own);
-        rows.extend(
-            new.into_iter()
-                .filter(|row| !rows.contains(row))
-                .collect::<Vec<_>>(),
-        );
-        if meets(&rows, target) {
-            break;
-        }
-    }
+    let specimen = loaded(dir, &smoothed_again(&params))?;
+    let rows = climb(dir, &specimen, target, &params, session)?;
     finish(dir, rows, target, session)
 }
 
-/// Algebraic and discretisation error of a row together, relative; None where either is not stated.
-fn stated(row: &Row) -> Option<f64> {
-    let [algebraic, discretization] = row.stated_errors_mpa();
-    let error = algebraic? + discretization?;
-    let limit = is_extrapolated(row) || row.key.boundary.is_none();
-    row.e_app_mpa()
-        .filter(|e| *e > 0.0 && limit)
-        .map(|e| error / e)
+fn climb(
+    dir: &Path,
+    specimen: &Specimen,
+    target: f64,
+    params: &SolveParams,
+    session: &Session,
+) -> Result<Vec<Row>> {
+    let step = |params: &SolveParams| solve(dir, &LatticeParams::default(), params, session);
+    let fits = |p: &SolveParams| estimate::refuse_what_does_not_fit(specimen, None, p);
+    let native = voxel_fe(params, 1, 1);
+    if let Err(refused) = fits(&native) {
+        for coarse in COARSENED.map(|n| voxel_fe(params, n, 1)) {
+            if fits(&coarse).is_ok() {
+                session.warn(format!("one element a voxel does not fit: {refused}"));
+                return step(&coarse);
+            }
+        }
+        return Err(refused);
+    }
+    let mut rows = step(&native)?;
+    let Image::Grey { blur_voxels } = image(specimen) else {
+        return Ok(rows);
+    };
+    let broken = |rows: &[Row]| rows.iter().all(Row::is_disconnected);
+    let done = |rows: &[Row]| !session.dry_run && (meets(rows, target) || broken(rows));
+    if done(&rows) || params.material.is_some() {
+        return Ok(rows);
+    }
+    let again = step(&smoothed_again(params))?;
+    for refined in REFINED.map(|n| voxel_fe(params, 1, n)) {
+        if let Err(refused) = fits(&refined) {
+            session.warn(format!("finer elements do not fit: {refused}"));
+            break;
+        }
+        let mut fine = step(&refined)?;
+        if let Some(learnt) = learnt(specimen, rows.first(), again.first(), fine.first()) {
+            let stated = Some(of_interpolated(blur_voxels, &learnt));
+            fine.iter_mut().for_each(|row| state(row, stated));
+            let keys: Vec<_> = fine.iter().map(|row| row.key.clone()).collect();
+            Results::open(dir, false)?.renote(|row| {
+                if keys.contains(&row.key) {
+                    state(row, stated);
+                }
+            })?;
+        }
+        rows.extend(fine);
+        if done(&rows) {
+            break;
+        }
+    }
+    rows.extend(again);
+    Ok(rows)
+}
+
+/// What one element a voxel, the smoother image and finer elements say together.
+fn learnt(
+    specimen: &Specimen,
+    native: Option<&Row>,
+    again: Option<&Row>,
+    fine: Option<&Row>,
+) -> Option<Learnt> {
+    let one = native?.e_app_mpa()?;
+    let change = |row: Option<&Row>| Some((row?.e_app_mpa()? / one - 1.0).abs());
+    let sensitivity = native?.solved.as_ref()?.threshold_sensitivity;
+    let voxel_mm = specimen.bone.grid.voxel_mm3().cbrt();
+    let thickness = plate_thickness_mm(&specimen.bone)? / voxel_mm;
+    Some(Learnt {
+        surface: surface(sensitivity, thickness),
+        again: change(again)?,
+        refined: change(fine)?,
+    })
 }
 
 fn best(rows: &[Row]) -> Option<(&Row, f64)> {
-    let stated = rows.iter().filter_map(|row| Some((row, stated(row)?)));
+    let stated = rows.iter().filter_map(|row| Some((row, row.error()?)));
     stated.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 

@@ -128,7 +128,7 @@ fn lattice(size_mm: Option<[f64; 3]>, recipe: &Recipe) -> (f64, Option<f64>) {
 /// Settings that do not fit the specimen.
 pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Result<Estimate> {
     let params = &match recipe.error {
-        Some(target) => ladder::expected(&specimen.bone, target, &recipe.solve),
+        Some(target) => ladder::expected(target, &recipe.solve),
         None => recipe.solve.clone(),
     };
     let kept = kept_bytes(specimen, params);

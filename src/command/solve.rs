@@ -17,10 +17,12 @@ use crate::pipeline::apparent::{Load, Method, SolveParams, lattice, voxel_fe};
 use crate::pipeline::lattice::{Boundary, Case, LatticeParams};
 use crate::record::results::Results;
 use crate::record::specimen;
-use crate::result::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapolated};
+use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
 use crate::result::ffb::with_ffb;
 use crate::result::row::{FailureLoad, Marks, Row};
 use crate::result::settings::{BoundaryRule, CellType, Settings};
+use crate::result::shape;
+use crate::result::shape::Stated;
 use crate::solver::cg::CgStep;
 use crate::volume::Specimen;
 use indicatif::ProgressBar;
@@ -98,7 +100,7 @@ pub fn solve(
 }
 
 /// With grey values where the material asks for them.
-fn loaded(dir: &Path, params: &SolveParams) -> Result<Specimen> {
+pub(super) fn loaded(dir: &Path, params: &SolveParams) -> Result<Specimen> {
     let mut specimen = load(dir)?;
     if params.needs_grey() {
         specimen::add_grey(dir, &mut specimen)?;
@@ -230,15 +232,35 @@ fn solve_job(
     bar.finish_and_clear();
     write_fields(dir, &recorded)?;
     let mut row = solved.row(blank.clone());
-    let discretization_error_mpa = voxel_fe_error(&row);
     if let Some(solved) = &mut row.solved {
-        solved.discretization_error_mpa = discretization_error_mpa;
+        solved.threshold_sensitivity = recorded.surface.map(|s| s.sensitivity);
         solved.failure = recorded.failure.map(|f| FailureLoad {
             load_n: f.load_n,
             factor: f.factor,
         });
     }
+    if params.method == Method::VoxelFe {
+        let stated = stated(dir, specimen, &row);
+        shape::state(&mut row, stated);
+    }
     Ok(metered(row, &meter))
+}
+
+/// What one solve by voxel elements states of its error against the body.
+fn stated(dir: &Path, specimen: &Specimen, row: &Row) -> Option<Stated> {
+    let voxel_mm = specimen.bone.grid.voxel_mm3().cbrt();
+    let sensitivity = row.solved.as_ref()?.threshold_sensitivity;
+    // A block of bone without a surface: nothing is open.
+    let surface = match plate_thickness_mm(&specimen.bone) {
+        Some(thickness_mm) => shape::surface(sensitivity, thickness_mm / voxel_mm),
+        None => 0.0,
+    };
+    shape::of_one_solve(
+        specimen::image(dir),
+        row.key.elements?,
+        row.key.lp_mm / voxel_mm,
+        surface,
+    )
 }
 
 /// `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView.

@@ -59,6 +59,37 @@ fn blend(out: &mut [f32], lines: [(&[f32], f32); 4]) {
     }
 }
 
+/// How much of a voxel's second differences is taken off: for the box of a voxel and the cubics' own blur together. Against
+/// bodies of known modulus, 1/6 left 2.2 % RMS where none left 3.4 % (`reports/truth-set.csv`).
+const SHARPENING: f32 = 1.0 / 6.0;
+
+/// Values less a sixth of the sum of their second differences, for images whose only blur is the voxel's own box.
+pub fn sharpened(grey: &Volume<f32>) -> Volume<f32> {
+    let [nx, ny, nz] = grey.grid.n;
+    let values = grey.as_slice();
+    // Straight on beyond the ends: no second difference there.
+    let second = |at: usize, i: usize, n: usize, stride: usize| match i > 0 && i + 1 < n {
+        true => values[at - stride] - 2.0 * values[at] + values[at + stride],
+        false => 0.0,
+    };
+    let mut sharp = vec![0f32; values.len()];
+    sharp
+        .par_chunks_mut((nx * ny).max(1))
+        .enumerate()
+        .for_each(|(z, plane)| {
+            for (i, v) in plane.iter_mut().enumerate() {
+                let at = z * nx * ny + i;
+                let sum = second(at, i % nx, nx, 1)
+                    + second(at, i / nx, ny, nx)
+                    + second(at, z, nz, nx * ny);
+                *v = values[at] - SHARPENING * sum;
+            }
+        });
+    let mut sharp = Volume::from_vec(grey.grid, sharp);
+    sharp.affine = grey.affine;
+    sharp
+}
+
 /// Bone on a grid `factor` times as fine: 1 where the interpolated value lies in `lower..=upper`.
 pub fn select_between(grey: &Volume<f32>, factor: usize, (lower, upper): (f32, f32)) -> Volume<u8> {
     let [nx, ny, nz] = grey.grid.n;

@@ -24,11 +24,16 @@ const JUMPS: [(f64, f64); 9] = [
 /// Share of bone voxels that is brighter, and of pore voxels that is darker, than the level taken for theirs.
 const TAIL: f64 = 0.1;
 
+/// Voxels that levels are taken from, about.
+const SAMPLED: usize = 2_000_000;
+
 /// σ in voxels of all blur beyond the voxels' own boxes, at most 2. None where `bone` has no edge or no contrast.
 pub fn edge_blur_voxels(grey: &Volume<f32>, bone: &Volume<u8>) -> Option<f64> {
     let (values, mask) = (grey.as_slice(), bone.as_slice());
+    // A sample will do for levels; its step shares no factor with usual edges.
+    let step = values.len().div_ceil(SAMPLED) | 1;
     let of = |wanted: u8| {
-        let both = values.iter().zip(mask);
+        let both = values.iter().zip(mask).step_by(step);
         both.filter(|(_, b)| **b == wanted)
             .map(|(v, _)| *v)
             .collect::<Vec<f32>>()

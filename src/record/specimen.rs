@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::image::{nifti, scan};
 use crate::io::atomic;
 use crate::pipeline::segment::{SegmentParams, SegmentSummary, Surface};
+use crate::result::shape::Image;
 use crate::volume::{Specimen, Threshold, Volume};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -97,6 +98,17 @@ pub fn load(dir: &Path) -> Result<Specimen> {
     })
 }
 
+/// What the segmented scan in `dir` says of the surface within a voxel.
+pub fn image(dir: &Path) -> Image {
+    let results = record(dir).map(|record| record.results);
+    match results {
+        Some(r) if r.surface == Surface::Grey => Image::Grey {
+            blur_voxels: r.blur_voxels.unwrap_or(0.0),
+        },
+        _ => Image::Mask,
+    }
+}
+
 /// Gives a specimen the grey values that `segment` kept in `dir`, and how its bone follows from them. Without kept values
 /// it stays as it is.
 ///
@@ -122,7 +134,7 @@ pub fn add_grey(dir: &Path, specimen: &mut Specimen) -> Result<()> {
         upper: upper.map_or(f32::INFINITY, |v| v as f32),
         inside,
         keep_all: record.settings.keep_all,
-        blur_voxels: record.settings.all_blur_voxels(),
+        blur_voxels: record.results.blur_voxels,
     });
     Ok(())
 }

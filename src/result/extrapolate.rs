@@ -1,11 +1,14 @@
 //! Owns what several resolutions of one specimen say together: the modulus in the limit and how far off it may be.
 //!
+//! The limit is that of the body that the voxels make, the voxel staircase. Bone is smooth: the limit answers for the
+//! staircase only and states no error of the bone's modulus.
+//!
 //! Both models come nearer to the limit as lattice parameter or element shrink, but not alike. The error of a graded
 //! lattice in bending, smeared over a cell, falls with the square of LP, beside scatter of where cells fall. That of voxel
 //! FE falls with the power 1.3 (edges of voxels; 1.17 to 1.31 fitted on phantoms, `reports/speed-vs-error.md`), from above.
 
 use crate::result::row::{Marks, Row, Solution};
-use crate::result::settings::{BoundaryRule, Load, Method, Settings};
+use crate::result::settings::{BoundaryRule, Elements, Load, Method, Settings};
 
 /// Order in LP of a graded lattice's error.
 const LATTICE_ORDER: f64 = 2.0;
@@ -13,11 +16,7 @@ const LATTICE_ORDER: f64 = 2.0;
 /// Order in element size of voxel FE's error: 1.17 to 1.31 fitted on phantoms over one, two and three elements a voxel.
 const VOXEL_ORDER: f64 = 1.3;
 
-/// Relative error of voxel FE, `VOXEL_ERROR · (element / strut thickness)^1.3`: nine in ten of the phantoms' solves, at elements of
-/// one, two and four voxels, are nearer (`reports/speed-vs-error.md`).
-const VOXEL_ERROR: f64 = 1.0;
-
-/// Part of the step from the finest elements to the limit that is left open: the limit of all phantoms is within it.
+/// Part of the step from the finest elements to the limit that is left open: the staircase's limit of all phantoms is within it.
 const STEP_LEFT: f64 = 0.75;
 
 /// What the voxels leave open on a lattice, `VOXELS_UNSEEN · voxel / strut thickness` of E_app: that load flows around
@@ -56,14 +55,18 @@ fn is_voxel_fe(row: &Row) -> bool {
     row.key.method == Method::VoxelFe
 }
 
-/// Voxel FE under one load, not the six of a stiffness matrix.
-fn is_one_load_of_voxel_fe(row: &Row) -> bool {
-    is_voxel_fe(row) && row.key.load != Load::Stiffness
+/// Voxel FE under one load of the mask's own voxels, whole or split: elements of other kinds are of other bodies.
+fn is_staircase(row: &Row) -> bool {
+    let of_voxels = matches!(
+        row.key.elements,
+        Some(Elements::Voxels | Elements::SplitVoxels)
+    );
+    is_voxel_fe(row) && of_voxels && row.key.load != Load::Stiffness
 }
 
 fn in_series(row: &Row) -> bool {
     let graded = row.key.boundary == Some(BoundaryRule::GRADED);
-    (graded || is_one_load_of_voxel_fe(row))
+    (graded || is_staircase(row))
         && row.converged() == Some(true)
         && row.e_app_mpa().is_some_and(|e| e > 0.0)
 }
@@ -148,7 +151,7 @@ fn voxel_limit(levels: &[Level]) -> Option<(f64, f64, String)> {
     let step = (coarse.e_mpa - fine.e_mpa) / (ratio - 1.0);
     let e = fine.e_mpa - step;
     let words = format!(
-        "limit of voxel FE from elements of {:.4} and {:.4} mm, order {VOXEL_ORDER}; {STEP_LEFT} of the step of {:.3} MPa from the finest is left open",
+        "limit of the voxel staircase, not of the bone, from elements of {:.4} and {:.4} mm, order {VOXEL_ORDER}; {STEP_LEFT} of the step of {:.3} MPa from the finest is left open",
         coarse.size,
         fine.size,
         step.abs(),
@@ -234,18 +237,6 @@ fn mean_edge([x, y, z]: [f64; 3]) -> f64 {
     } else {
         (x * y * z).powf(1.0 / 3.0)
     }
-}
-
-/// What one voxel-FE solve leaves open, from how thick struts are in elements. None where the thickness is not known.
-pub fn voxel_fe_error(row: &Row) -> Option<f64> {
-    let share = (row.key.lp_mm / row.marks.mean_thickness_mm?).powf(VOXEL_ORDER);
-    is_one_load_of_voxel_fe(row).then_some(())?;
-    Some(VOXEL_ERROR * share * row.e_app_mpa()?)
-}
-
-/// Relative error to be expected of the limit from elements of this size and twice as long.
-pub fn expected_of_pair(element_mm: f64, thickness_mm: f64) -> f64 {
-    STEP_LEFT * VOXEL_ERROR * (element_mm / thickness_mm).powf(VOXEL_ORDER)
 }
 
 #[cfg(test)]

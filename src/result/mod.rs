@@ -4,4 +4,5 @@ pub mod extrapolate;
 pub mod ffb;
 pub mod row;
 pub mod settings;
+pub mod shape;
 pub mod statistics;

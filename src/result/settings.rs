@@ -231,6 +231,8 @@ pub enum Elements {
     Voxels,
     /// Interpolated grey values, thresholded again.
     InterpolatedGrey,
+    /// Grey values smoothed once more, one element a voxel: shows what a coarser image would change, and answers nothing.
+    SmoothedGrey,
     /// The mask's voxels, split: they converge to the voxel staircase.
     SplitVoxels,
     /// Means of blocks of voxels, thresholded.
@@ -291,6 +293,7 @@ impl Settings {
     pub fn without_resolution(&self) -> Settings {
         Settings {
             lp_mm: 0.0,
+            elements: None,
             registration_mm: None,
             tolerance: None,
             ..self.clone()

@@ -57,6 +57,8 @@ pub struct SolveParams {
     pub refine: usize,
     /// Split the mask's voxels where `refine` would interpolate grey values: elements of the voxel staircase.
     pub refine_mask: bool,
+    /// voxel-fe: smooth the grey values once more, by [`crate::result::shape::AGAIN_VOXELS`], and threshold again.
+    pub smoothed_again: bool,
     /// voxel-fe: this many voxels along every axis become one element.
     pub coarsen: usize,
     pub coarsen_by: CoarsenBy,
@@ -85,6 +87,7 @@ impl Default for SolveParams {
             max_iterations: 200_000,
             refine: 1,
             refine_mask: false,
+            smoothed_again: false,
             coarsen: 1,
             coarsen_by: CoarsenBy::default(),
             mechanisms: false,
@@ -98,6 +101,7 @@ impl SolveParams {
     /// Whether grey values of the scan are needed beside its mask.
     pub fn needs_grey(&self) -> bool {
         self.material.is_some()
+            || self.smoothed_again
             || (self.refine > 1 && !self.refine_mask)
             || (self.coarsen > 1 && self.coarsen_by == CoarsenBy::Threshold)
     }

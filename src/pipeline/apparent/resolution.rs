@@ -3,9 +3,10 @@
 use crate::error::{Error, Result};
 use crate::mask::components::Components;
 use crate::mask::voi::Inside;
-use crate::mask::{resample, upsample};
+use crate::mask::{gaussian, resample, upsample};
 use crate::pipeline::apparent::{CoarsenBy, Method, SolveParams};
 use crate::result::settings::Elements;
+use crate::result::shape::{AGAIN_VOXELS, BLURRED_VOXELS, Image};
 use crate::volume::{Specimen, Threshold, Volume};
 
 /// Bone fraction of a block of voxels from which on it is bone.
@@ -23,9 +24,19 @@ pub fn resolved(specimen: &Specimen, params: &SolveParams) -> Result<Option<Spec
     if params.method != Method::VoxelFe || params.material.is_some() {
         return Ok(None);
     }
-    let bone = if params.refine > 1 && !params.refine_mask {
+    let bone = if params.smoothed_again {
         match (&specimen.grey, &specimen.threshold) {
-            (Some(grey), Some(threshold)) => interpolated(grey, threshold, params.refine),
+            (Some(grey), Some(threshold)) => smoothed(grey, threshold),
+            _ => return Ok(None),
+        }
+    } else if params.refine > 1 && !params.refine_mask {
+        match (&specimen.grey, &specimen.threshold) {
+            (Some(grey), Some(threshold)) => match image(specimen) {
+                Image::Grey { blur_voxels } if blur_voxels < BLURRED_VOXELS => {
+                    interpolated(&upsample::sharpened(grey), threshold, params.refine)
+                }
+                _ => interpolated(grey, threshold, params.refine),
+            },
             _ => return Ok(None),
         }
     } else if params.coarsen > 1 && params.coarsen_by == CoarsenBy::Threshold {
@@ -49,11 +60,22 @@ pub fn resolved(specimen: &Specimen, params: &SolveParams) -> Result<Option<Spec
     }))
 }
 
+/// What a specimen's image says of the surface within a voxel.
+pub fn image(specimen: &Specimen) -> Image {
+    match (&specimen.grey, &specimen.threshold) {
+        (Some(_), Some(threshold)) => Image::Grey {
+            blur_voxels: threshold.blur_voxels.unwrap_or(0.0),
+        },
+        _ => Image::Mask,
+    }
+}
+
 /// What the elements follow from.
 pub fn elements(specimen: &Specimen, params: &SolveParams) -> Elements {
     let resolved = params.material.is_none();
     let grey = specimen.grey.is_some() && specimen.threshold.is_some();
     match (params.refine, params.coarsen, params.coarsen_by) {
+        (1, 1, _) if params.smoothed_again && grey => Elements::SmoothedGrey,
         (1, 1, _) => Elements::Voxels,
         (1, _, CoarsenBy::Threshold) if resolved => Elements::BlockMeans,
         (1, _, _) => Elements::BoneFractions,
@@ -67,6 +89,7 @@ pub fn one_element_a_voxel(params: &SolveParams) -> SolveParams {
     SolveParams {
         refine: 1,
         coarsen: 1,
+        smoothed_again: false,
         ..params.clone()
     }
 }
@@ -95,6 +118,22 @@ fn at_least_half(mask: &Volume<u8>, factor: usize) -> Volume<u8> {
     };
     let voxels = fractions.as_slice().iter().zip(wider.as_slice());
     Volume::from_vec(fractions.grid, voxels.map(is_bone).collect())
+}
+
+/// Grey values smoothed once more and thresholded again.
+fn smoothed(grey: &Volume<f32>, threshold: &Threshold) -> Volume<u8> {
+    let window = threshold.lower..=threshold.upper;
+    let slabs = gaussian::map_slabs(
+        grey,
+        AGAIN_VOXELS,
+        |v| v,
+        |_, values| {
+            let bone = values.iter().map(|v| u8::from(window.contains(v)));
+            bone.collect::<Vec<u8>>()
+        },
+    );
+    let bone = Volume::from_vec(grey.grid, slabs.concat());
+    kept(bone, threshold.inside.as_ref(), threshold.keep_all)
 }
 
 /// Grey values interpolated `factor` times as fine and thresholded again, inside the volume of interest, connected as the

@@ -15,6 +15,7 @@ use crate::grid::Grid;
 use crate::mask::components::Components;
 use crate::mask::ends;
 use crate::mask::voi::Inside;
+use crate::measure::edge_blur::edge_blur_voxels;
 use crate::measure::morphometry::morphometry;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::volume::{Specimen, Threshold, Volume};
@@ -62,7 +63,7 @@ pub fn segment<'a>(
         placed.corner_mm,
     )?;
     let tv_mm3 = inside.tv_mm3(&grid);
-    let specimen = Specimen {
+    let mut specimen = Specimen {
         name: name.into(),
         threshold: threshold_of(&placed, params, &inside, grid),
         grey: params
@@ -72,6 +73,10 @@ pub fn segment<'a>(
         tv_mm3,
         tv_definition,
     };
+    if let (Some(grey), Some(threshold)) = (&specimen.grey, &mut specimen.threshold) {
+        let measured = || edge_blur_voxels(grey, &specimen.bone);
+        threshold.blur_voxels = params.all_blur_voxels().or_else(measured);
+    }
     let mut summary = SegmentSummary {
         voxels: grid.n,
         spacing_mm: grid.spacing_mm,
@@ -82,6 +87,7 @@ pub fn segment<'a>(
             Some(_) => Surface::Grey,
             None => Surface::Mask,
         },
+        blur_voxels: specimen.threshold.as_ref().and_then(|t| t.blur_voxels),
         grey_min: f64::from(placed.grey.min),
         grey_max: f64::from(placed.grey.max),
         non_finite_voxels: placed.grey.non_finite,
@@ -166,7 +172,7 @@ fn threshold_of(
         upper: upper.map_or(f32::INFINITY, |v| v as f32),
         inside: inside.mask(grid),
         keep_all: params.keep_all,
-        blur_voxels: params.all_blur_voxels(),
+        blur_voxels: None,
     })
 }
 

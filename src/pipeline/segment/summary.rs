@@ -17,6 +17,9 @@ pub struct SegmentSummary {
     /// What is known of the surface within a voxel.
     #[serde(default)]
     pub surface: Surface,
+    /// σ in voxels of all blur of the grey values, smoothing included: as given, or read off the edges.
+    #[serde(default)]
+    pub blur_voxels: Option<f64>,
     /// Range of the finite grey values before smoothing.
     pub grey_min: f64,
     pub grey_max: f64,

@@ -73,7 +73,7 @@ pub fn cohort(
     let estimates: Vec<Estimate> = jobs
         .iter()
         .map(|job| estimate(&job.input, job.segment.spacing_mm, recipe))
-        .collect();
+        .collect::<Result<_>>()?;
     if session.dry_run {
         let results = plan(recipe, &jobs, &estimates, out, session);
         return Ok((outcome(&results), results));

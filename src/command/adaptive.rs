@@ -4,15 +4,12 @@
 //! differ by a factor of two, beginning at the coarsest pair that can be expected to suffice.
 
 use crate::command::ladder::{PAIRS, element_mm, suffices, voxel_fe};
-use crate::command::segment::load;
-use crate::command::solve::{in_words, solve};
+use crate::command::solve::{OpenScan, in_words};
 use crate::error::Result;
 use crate::machine::session::Session;
-use crate::measure::thickness::plate_thickness_mm;
 use crate::pipeline::apparent::{Method, SolveParams};
 use crate::pipeline::lattice::{Boundary, LatticeParams, Structure};
 use crate::record::error_target_note::Missed;
-use crate::record::results::Results;
 use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
 use crate::result::row::Row;
 use std::path::Path;
@@ -37,37 +34,28 @@ pub struct Found {
 /// # Errors
 /// As [`solve`].
 pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session) -> Result<Found> {
-    let specimen = load(dir)?;
+    let mut scan = OpenScan::open(dir, params, false, session)?;
     if !session.dry_run {
         // Of an earlier error asked for.
-        Results::open(dir, false)?.renote(Missed::take_back)?;
+        scan.results().renote(Missed::take_back)?;
+        if session.force {
+            scan.results().clear()?;
+        }
     }
-    if session.force && !session.dry_run {
-        Results::begin_anew(dir)?;
-    }
-    // Dropped once: redone at every step, each would drop what the one before it solved.
-    let session = &Session {
-        force: false,
-        ..session.clone()
-    };
     let mut rows = Vec::new();
     let params = SolveParams {
         // A tenth of the whole error is left to the solver.
         tolerance: params.tolerance.min(0.1 * target),
         ..params.clone()
     };
-    let bone = &specimen.bone;
-    let Some(thickness) = plate_thickness_mm(bone) else {
+    let Some(thickness) = scan.plate_thickness_mm() else {
         // A block of bone without a surface: one element a voxel is exact.
-        rows = solve(
-            dir,
-            &LatticeParams::default(),
-            &voxel_fe(&params, 1, 1),
-            session,
-        )?;
+        let whole = voxel_fe(&params, 1, 1);
+        rows = scan.solve(&LatticeParams::default(), &whole, session)?;
         return Ok(Found { rows, met: true });
     };
-    let shortest = bone
+    let shortest = scan
+        .bone()
         .grid
         .size_mm()
         .into_iter()
@@ -85,18 +73,18 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
             method: Method::Lattice,
             ..params.clone()
         };
-        rows.extend(solve(dir, &lattices, &lattice, session)?);
+        rows.extend(scan.solve(&lattices, &lattice, session)?);
         if !session.dry_run && (meets(&rows, target) || rows.iter().all(Row::is_disconnected)) {
-            return finish(dir, rows, target, session);
+            return finish(&mut scan, rows, target, session);
         }
     }
-    let elements = bone.as_slice().iter().filter(|b| **b != 0).count() as f64;
-    let suffices = |pair| suffices(bone, pair, thickness, target);
-    let any = PAIRS.into_iter().any(suffices);
-    for (coarsen, refine) in PAIRS {
-        let element = element_mm(bone, (coarsen, refine));
+    let elements = scan.bone().as_slice().iter().filter(|b| **b != 0).count() as f64;
+    let expected = PAIRS.map(|pair| suffices(scan.bone(), pair, thickness, target));
+    let any = expected.contains(&true);
+    for ((coarsen, refine), suffices) in PAIRS.into_iter().zip(expected) {
+        let element = element_mm(scan.bone(), (coarsen, refine));
         // Where none can be expected to suffice, one element a voxel says how far one gets.
-        if !suffices((coarsen, refine)) && (any || (coarsen, refine) != (1, 1)) {
+        if !suffices && (any || (coarsen, refine) != (1, 1)) {
             continue;
         }
         if elements * (refine as f64).powi(3) > MOST_ELEMENTS {
@@ -115,12 +103,8 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         let pair = [twice, (coarsen, refine)];
         let mut own = Vec::new();
         for (coarsen, refine) in pair {
-            own.extend(solve(
-                dir,
-                &none,
-                &voxel_fe(&params, coarsen, refine),
-                session,
-            )?);
+            let elements = voxel_fe(&params, coarsen, refine);
+            own.extend(scan.solve(&none, &elements, session)?);
         }
         // Neighbouring pairs share a size.
         let new = with_extrapolated(&own);
@@ -133,7 +117,7 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
             break;
         }
     }
-    finish(dir, rows, target, session)
+    finish(&mut scan, rows, target, session)
 }
 
 /// Algebraic and discretisation error of a row together, relative; None where either is not stated.
@@ -168,7 +152,7 @@ fn percent(x: f64) -> String {
 }
 
 /// Says what came of it; where the target is missed, so do the rows, here and in the results.
-fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Result<Found> {
+fn finish(scan: &mut OpenScan, mut rows: Vec<Row>, target: f64, session: &Session) -> Result<Found> {
     if session.dry_run || rows.iter().all(Row::is_disconnected) {
         return Ok(Found { rows, met: true });
     }
@@ -195,7 +179,7 @@ fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Res
             said(target, nearest),
         );
         rows.iter_mut().for_each(|row| missed.note(row));
-        Results::open(dir, false)?.renote(|row| missed.note(row))?;
+        scan.results().renote(|row| missed.note(row))?;
     }
     Ok(Found { rows, met })
 }

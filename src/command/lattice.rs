@@ -9,8 +9,10 @@ use crate::export::{lammps, vtk};
 use crate::grid::Axis;
 use crate::io::atomic;
 use crate::machine::session::Session;
-use crate::pipeline::apparent::SolveParams;
+use crate::physics::material::Solid;
+use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::tissue::Tissue;
+use crate::pipeline::apparent::{SolveParams, of_lattice};
 use crate::pipeline::lattice::{
     Case, LatticeParams, LatticeSummary, build, build_connected, build_of, summarise,
     summarise_connected,
@@ -92,9 +94,17 @@ pub fn lattice(
             "LAMMPS data hold bonds alone, and a lattice of bonds alone has a Poisson's ratio of 0.25, whatever the tissue's (0.3 unless told otherwise): hold their results against `solve --poisson 0.25`",
         );
     }
+    let tissue = Tissue::Uniform(Solid {
+        young_mpa,
+        poisson: exports.tissue.poisson,
+    });
+    let prepared = Prepared {
+        specimen: &specimen,
+        tissue: &tissue,
+    };
     let mut lattices = Vec::new();
     for case in params.cases() {
-        refuse_lattice_that_does_not_fit(&specimen, &case)?;
+        refuse_lattice_that_does_not_fit(&of_lattice(case), prepared, &exports.tissue)?;
         let summary = if case.is_connected() {
             let pieces = build_connected(&specimen, &case, Axis::Z, 0.0)?;
             written.pieces(&case, &pieces)?;

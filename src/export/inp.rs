@@ -6,8 +6,9 @@ use crate::error::{Error, Result};
 use crate::export::bins::Bins;
 use crate::io::atomic;
 use crate::operator::held::Held;
-use crate::pipeline::apparent::bricks::{Bricks, Keep};
+use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::tissue::Tissue;
+use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use crate::pipeline::apparent::voxel_fe::supports;
 use crate::pipeline::apparent::{Ends, Load, Method, SolveParams};
 use crate::volume::Specimen;
@@ -43,7 +44,9 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
             "use --load uniaxial or confined",
         );
     }
-    let model = Bricks::new(specimen, params, Keep::BetweenGrips)?;
+    let tissue = &Tissue::of(specimen, params)?;
+    let prepared = Prepared { specimen, tissue };
+    let model = Bricks::new(prepared, params, Keep::BetweenGrips)?;
     let mesh = model.mesh();
     if mesh.is_empty() {
         return Err(Error::specimen(
@@ -52,9 +55,9 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
         ));
     }
     let grips = Planes::within(&mesh.grid, params.axis, params.grip_mm)?;
-    let (young_mpa, poissons) = match Tissue::of(specimen, params)? {
+    let (young_mpa, poissons) = match tissue {
         Tissue::Uniform(solid) => (solid.young_mpa, vec![solid.poisson]),
-        Tissue::Mixed(mixed) => (mixed.mean_mpa, mixed.poissons),
+        Tissue::Mixed(mixed) => (mixed.mean_mpa, mixed.poissons.clone()),
     };
     let stiffness: Vec<(f64, u8)> = corners(mesh)
         .map(|node| {
@@ -111,7 +114,8 @@ fn fill(
 ) -> std::io::Result<()> {
     let axis = params.axis.index();
     let gauge_mm = (grips.high - grips.low) as f64 * mesh.grid.spacing_mm[axis];
-    let (held, u) = supports(mesh, grips, params, params.strain * gauge_mm);
+    let held = supports::held(mesh, grips, params);
+    let u = supports::bar(mesh, grips, params.strain * gauge_mm);
     writeln!(
         out,
         "** {} elements; mm, N, MPa; E_app = force of HIGH x {gauge_mm} mm / (area x {} mm)",

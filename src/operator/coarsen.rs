@@ -38,6 +38,32 @@ pub trait Coarsen: Operator<3> {
     fn eigenvalue_bound(&self) -> f64;
 }
 
+impl<O: Coarsen> Coarsen for &O {
+    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
+        (**self).positions(sites, x);
+    }
+
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
+        (**self).each_row(sites, visit);
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        (**self).reach(sites)
+    }
+
+    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        (**self).rows_f64(sites, x, y);
+    }
+
+    fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
+        (**self).rows_f32(sites, x, y);
+    }
+
+    fn eigenvalue_bound(&self) -> f64 {
+        (**self).eigenvalue_bound()
+    }
+}
+
 /// What can be applied to any range of rows needs no more than that.
 impl<O: Coarsen> MixedPrecision for O {
     fn apply_single(

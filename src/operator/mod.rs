@@ -18,6 +18,20 @@ pub trait Operator<const D: usize>: Sync {
     fn diagonal(&self, d: &mut [[f64; D]]);
 }
 
+impl<const D: usize, O: Operator<D>> Operator<D> for &O {
+    fn sites(&self) -> usize {
+        (**self).sites()
+    }
+
+    fn apply(&self, x: &[[f64; D]], y: &mut [[f64; D]]) {
+        (**self).apply(x, y);
+    }
+
+    fn diagonal(&self, d: &mut [[f64; D]]) {
+        (**self).diagonal(d);
+    }
+}
+
 /// An approximate inverse, symmetric and positive definite on the free unknowns: `z ≈ A⁻¹ r`.
 pub trait Preconditioner<const D: usize>: Sync {
     fn apply(&self, r: &[[f64; D]], z: &mut [[f64; D]]);

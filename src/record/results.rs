@@ -133,6 +133,7 @@ impl Results {
             (new.row.marks.group, new.row.marks.subject) =
                 (old.marks.group.clone(), old.marks.subject.clone());
         }
+        self.record.provenance.date = host::date();
         match self.record.rows.iter_mut().find(|old| old.key == new.key) {
             Some(old) => *old = new,
             None => self.record.rows.push(new),
@@ -166,12 +167,18 @@ impl Results {
         }
     }
 
-    /// Drops what is kept in `dir`.
+    /// BLAKE3 of the mask that the results are of.
+    pub fn mask_blake3(&self) -> &str {
+        &self.record.provenance.mask_blake3
+    }
+
+    /// Drops all rows.
     ///
     /// # Errors
-    /// As [`Results::open`], and files that cannot be written.
-    pub fn begin_anew(dir: &Path) -> Result<()> {
-        Results::open(dir, true)?.write()
+    /// Files that cannot be written.
+    pub fn clear(&mut self) -> Result<()> {
+        self.record.rows.clear();
+        self.write()
     }
 
     fn write(&self) -> Result<()> {

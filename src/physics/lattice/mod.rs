@@ -55,8 +55,8 @@ pub trait Virial: Sync {
 }
 
 /// The linearised lattice as an operator: `K u` is the gradient of the energy. N and mm.
-pub struct Lattice<'a> {
-    sites: &'a Sites,
+pub struct Lattice {
+    pub sites: Sites,
     moduli: Moduli,
     pairs: Vec<Pair>,
     double: Scaled<f64>,
@@ -64,18 +64,18 @@ pub struct Lattice<'a> {
     room: Mutex<Vec<[f64; 2]>>,
 }
 
-impl<'a> Lattice<'a> {
-    pub fn new(sites: &'a Sites, moduli: Moduli) -> Self {
+impl Lattice {
+    pub fn new(sites: Sites, moduli: Moduli) -> Self {
         Lattice::of(sites, moduli, None)
     }
 
     /// A lattice whose sites have volumetric moduli `w_i T` (N/mm) of their own, beside `w_i k_s`.
-    pub fn with_volumetric(sites: &'a Sites, moduli: Moduli, volumetric: Vec<f64>) -> Self {
+    pub fn with_volumetric(sites: Sites, moduli: Moduli, volumetric: Vec<f64>) -> Self {
         assert!(volumetric.len() == sites.len());
         Lattice::of(sites, moduli, Some(volumetric))
     }
 
-    fn of(sites: &'a Sites, moduli: Moduli, own_volumetric: Option<Vec<f64>>) -> Self {
+    fn of(sites: Sites, moduli: Moduli, own_volumetric: Option<Vec<f64>>) -> Self {
         let stencil = sites.frame.structure.stencil();
         let pair = |(p, d): (usize, &[i32; 3])| {
             let d = d.map(f64::from);
@@ -158,7 +158,7 @@ impl<'a> Lattice<'a> {
     }
 }
 
-impl Virial for Lattice<'_> {
+impl Virial for Lattice {
     fn virial<S: Copy + Into<f64>>(
         &self,
         u: &[[S; 3]],
@@ -175,7 +175,7 @@ impl Virial for Lattice<'_> {
     }
 }
 
-impl Lattice<'_> {
+impl Lattice {
     fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize, row: &[u32]) -> f64 {
         let (axis, grips) = (self.sites.frame.axis.index(), self.sites.grips);
         let theta = match self.double.is_volumetric() {
@@ -229,14 +229,14 @@ fn along<S: Copy + Into<f64>>(d: [f64; 3], a: [S; 3], b: [S; 3]) -> f64 {
     (0..3).map(|c| d[c] * (a[c].into() - b[c].into())).sum()
 }
 
-impl Operator<3> for Lattice<'_> {
+impl Operator<3> for Lattice {
     fn sites(&self) -> usize {
         self.sites.len()
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         let mut room = self.room();
-        self.double.apply(self.sites, x, y, &mut room, |_, _| 0.0);
+        self.double.apply(&self.sites, x, y, &mut room, |_, _| 0.0);
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
@@ -250,7 +250,7 @@ impl Operator<3> for Lattice<'_> {
     }
 }
 
-impl MixedPrecision for Lattice<'_> {
+impl MixedPrecision for Lattice {
     fn apply_single(
         &self,
         x: &[[f32; 3]],
@@ -260,7 +260,7 @@ impl MixedPrecision for Lattice<'_> {
         let mut room = self.room();
         let sites = room.len();
         let room = &mut bytemuck::cast_slice_mut(&mut room)[..sites];
-        self.single.apply(self.sites, x, y, room, finish)
+        self.single.apply(&self.sites, x, y, room, finish)
     }
 
     fn each_part(
@@ -269,7 +269,7 @@ impl MixedPrecision for Lattice<'_> {
         out: &mut [[f32; 3]],
         take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        let (sites, double) = (self.sites, &self.double);
+        let (sites, double) = (&self.sites, &self.double);
         let mut t = self.room();
         t.par_chunks_mut(PORTION).enumerate().for_each(|(c, t)| {
             double.pressures(sites, range(c, t.len()), x, t);
@@ -287,7 +287,7 @@ impl MixedPrecision for Lattice<'_> {
     }
 }
 
-impl Lattice<'_> {
+impl Lattice {
     /// Room for every site's `w T θ`; empty at ν = ¼, where no volumetric pass is made.
     fn room(&self) -> MutexGuard<'_, Vec<[f64; 2]>> {
         self.room

@@ -1,6 +1,6 @@
 //! Owns what a solve yields, and its row of the results table.
 
-use crate::pipeline::apparent::{Load, SolveParams};
+use crate::pipeline::apparent::params::{Load, SolveParams};
 use crate::result::row::{Marks, Row, Solution};
 use crate::result::settings::{Settings, Supports};
 use crate::solver::cg::Ended;

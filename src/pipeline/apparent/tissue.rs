@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::physics::material::{Law, Material, Solid};
-use crate::pipeline::apparent::SolveParams;
+use crate::pipeline::apparent::params::SolveParams;
 use crate::result::settings::Settings;
 use crate::volume::Specimen;
 use rayon::prelude::*;

@@ -1,79 +1,61 @@
-//! Owns how much memory a solve takes, told from the bone before anything is built.
+//! Owns how much memory and time voxel elements take, from the bone before anything is built.
 //!
-//! Memory goes with what is kept a node or site (vectors, neighbours, diagonal) and, on voxel elements, with the boxes of
-//! multigrid's aggregates (the assembled levels). The factors are fits to the program's own peaks, within 11 % on ten
-//! voxel meshes of 0.1 to 28 million nodes and within 15 % on twelve lattices of all kinds (`cargo bench --bench memory`
-//! prints both for fourteen solves, `cargo test --release -- --ignored memory_is` for eight whole commands).
+//! Memory goes with what is kept a node (vectors, diagonal) and with the boxes of multigrid's aggregates (the assembled
+//! levels). The factors are fits to the program's own peaks, within 11 % on ten meshes of 0.1 to 28 million nodes (`cargo
+//! bench --bench memory` prints peaks and estimates, `cargo test --release -- --ignored memory_is` holds eight whole commands
+//! to them).
 
-use crate::discretisation::lattice::sites::Sites;
-use crate::error::Result;
 use crate::grid::Grid;
 use crate::mask::resample;
-use crate::pipeline::apparent::bricks::LEAST_FRACTION;
-use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::apparent::{Conditions, Load, Method, SolveParams};
-use crate::pipeline::lattice::{Case, build_connected, build_of};
-use crate::solver::amg::AmgParams;
+use crate::pipeline::apparent::discretisation::{ASSUMED_BONE, Cost, Known, Prepared, Resolution};
+use crate::pipeline::apparent::params::{Conditions, Load, SolveParams};
+use crate::pipeline::apparent::voxel_fe::bricks::LEAST_FRACTION;
 use crate::volume::{Specimen, Volume};
 use rayon::prelude::*;
-use std::collections::HashSet;
 
 /// Bytes a node and a box of [`BOX`] nodes; of elements that differ, more a node (a factor and a whole diagonal block).
 const NODE: f64 = 101.0;
 const NODE_BOX: f64 = 1850.0;
 const DIFFERING: f64 = 28.0;
 
-/// Bytes a lattice site and a box of multigrid's, and a site of graded lattices, whose bonds have shares.
-const SITE: f64 = 115.0;
-const SITE_BOX: f64 = 2500.0;
-const PIECE: f64 = 360.0;
-
-/// Bytes more a site of a factor of its own, in both precisions, and of a diagonal block that few others have; and a node, of
-/// the five fields that a stiffness tensor keeps.
-const WEIGHTED: f64 = 36.0;
+/// Bytes more a node of the five fields that a stiffness tensor keeps.
 const KEPT_FIELDS: f64 = 60.0;
 
 /// Edge of multigrid's boxes in nodes.
 const BOX: usize = 5;
 
+/// Bytes and seconds (two cores) per hexahedron before nodes are counted: 6.4 s for 1 869 627 elements.
+const BYTES_PER_ELEMENT: f64 = 220.0;
+const S_PER_ELEMENT: f64 = 3.5e-6;
+
+/// What a solve takes.
+pub fn of(params: &SolveParams, known: Known) -> Cost {
+    let per_voxel = (params.refine as f64 / params.coarsen as f64).powi(3);
+    let voxels = match known {
+        Known::Header { voxels, .. } => ASSUMED_BONE * voxels,
+        Known::Volume(Prepared { specimen, .. }) | Known::Bone(Prepared { specimen, .. }) => {
+            specimen.bv_mm3() / specimen.bone.grid.voxel_mm3()
+        }
+    };
+    // Those without load are not dropped yet.
+    let elements = voxels * per_voxel;
+    let bytes = match known {
+        Known::Header { .. } => [elements * BYTES_PER_ELEMENT; 2],
+        Known::Volume(_) => [0.0, elements * BYTES_PER_ELEMENT],
+        Known::Bone(Prepared { specimen, .. }) => [counted(specimen, params); 2],
+    };
+    Cost {
+        bytes,
+        time_s: Some(elements * S_PER_ELEMENT),
+        resolution: match params.refine {
+            1 => Resolution::Coarsen(params.coarsen),
+            refine => Resolution::Refine(refine),
+        },
+    }
+}
+
 /// Bytes of a solve beyond the specimen, at their highest; 0 where there is nothing to solve.
-///
-/// # Errors
-/// Settings that do not fit the specimen.
-pub fn of_lattice(specimen: &Specimen, case: &Case, params: &SolveParams) -> Result<f64> {
-    if case.is_connected() {
-        let pieces = build_connected(specimen, case, params.axis, params.grip_mm)?;
-        return Ok(pieces.len() as f64 * PIECE);
-    }
-    let tissue = Tissue::of(specimen, params)?;
-    let factors = match &tissue {
-        Tissue::Uniform(_) => None,
-        Tissue::Mixed(mixed) => Some(&mixed.factor[..]),
-    };
-    let sites = build_of(specimen, factors, case, params.axis, params.grip_mm)?;
-    let mut site = SITE;
-    if sites.weights.is_some() {
-        site += WEIGHTED;
-    }
-    if matches!(&tissue, Tissue::Mixed(mixed) if mixed.poissons.len() > 1) {
-        site += WEIGHTED;
-    }
-    Ok(sites.len() as f64 * site + boxes(&sites) as f64 * SITE_BOX)
-}
-
-/// Multigrid's boxes that hold sites.
-fn boxes(sites: &Sites) -> usize {
-    let edges = AmgParams::lattice(sites.frame.lp_mm).box_mm;
-    let of = |at: &[i32; 3]| {
-        let x = sites.frame.position_mm(*at);
-        [0, 1, 2].map(|a| (x[a] / edges[a]).floor() as i32)
-    };
-    let held: HashSet<[i32; 3]> = sites.indices.iter().map(of).collect();
-    held.len()
-}
-
-/// The same for voxel elements.
-pub fn of_voxel_fe(specimen: &Specimen, params: &SolveParams) -> f64 {
+fn counted(specimen: &Specimen, params: &SolveParams) -> f64 {
     let grid = &specimen.bone.grid;
     let differing = params.coarsen > 1 || params.material.is_some();
     let counts = match params.coarsen {
@@ -186,17 +168,6 @@ fn nodes_and_boxes(grid: &Grid, is_bone: impl Fn([usize; 3]) -> bool + Sync) -> 
     sum((0..n[2].div_ceil(BOX)).into_par_iter().map(layer))
 }
 
-/// Bytes of one job.
-///
-/// # Errors
-/// As [`of_lattice`].
-pub fn of(specimen: &Specimen, case: Option<&Case>, params: &SolveParams) -> Result<f64> {
-    match (params.method, case) {
-        (Method::Lattice, Some(case)) => of_lattice(specimen, case, params),
-        _ => Ok(of_voxel_fe(specimen, params)),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -215,12 +186,11 @@ mod tests {
             tv_definition: "box".into(),
         };
         let coarse = SolveParams {
-            method: Method::VoxelFe,
             coarsen: 4,
             ..SolveParams::default()
         };
-        assert_eq!(of_voxel_fe(&specimen, &coarse), 0.0);
-        assert!(of_voxel_fe(&specimen, &SolveParams::default()) > 0.0);
+        assert_eq!(counted(&specimen, &coarse), 0.0);
+        assert!(counted(&specimen, &SolveParams::default()) > 0.0);
     }
 
     #[test]

@@ -9,7 +9,8 @@ use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::physics::hex8::Hex8;
 use crate::physics::hex8::element::Integration;
 use crate::physics::hex8::graded::Graded;
-use crate::pipeline::apparent::SolveParams;
+use crate::pipeline::apparent::discretisation::Prepared;
+use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::tissue::{Mixed, Tissue};
 use crate::volume::Specimen;
 use std::ops::Range;
@@ -38,11 +39,12 @@ pub enum Bricks {
 impl Bricks {
     /// # Errors
     /// Grips that meet, or too many nodes.
-    pub fn new(specimen: &Specimen, params: &SolveParams, keep: Keep) -> Result<Self> {
-        let solid = match Tissue::of(specimen, params)? {
+    pub fn new(prepared: Prepared, params: &SolveParams, keep: Keep) -> Result<Self> {
+        let Prepared { specimen, tissue } = prepared;
+        let solid = match tissue {
             Tissue::Uniform(solid) => solid,
             Tissue::Mixed(mixed) => {
-                return Ok(Bricks::Graded(of_mixed(specimen, &mixed, params, keep)?));
+                return Ok(Bricks::Graded(of_mixed(specimen, mixed, params, keep)?));
             }
         };
         let (young, nu) = (solid.young_mpa, solid.poisson);

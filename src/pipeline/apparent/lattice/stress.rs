@@ -8,12 +8,12 @@ use crate::physics::lattice::Virial;
 pub struct Stress<'a, M> {
     pub model: &'a M,
     /// Which sites count; all where there is none. Made once, as the stress is asked for in every iteration.
-    pub counts: Option<Vec<bool>>,
+    pub counts: Option<&'a [bool]>,
 }
 
 impl<M: Virial> Stress<'_, M> {
     fn sum<S: Copy + Into<f64> + Sync>(&self, u: &[[S; 3]]) -> f64 {
-        let counts = |s: usize| self.counts.as_ref().is_none_or(|counts| counts[s]);
+        let counts = |s: usize| self.counts.is_none_or(|counts| counts[s]);
         sum_chunks(u.len(), |sites| self.model.virial(u, sites, counts))
     }
 }

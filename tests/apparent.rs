@@ -3,7 +3,7 @@
 use crate::cli::run;
 use crate::segment::shared_stack;
 use bonepd_ct::grid::{Axis, Grid};
-use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
+use bonepd_ct::pipeline::apparent::solve_lattice;
 use bonepd_ct::pipeline::apparent::solved::Solved;
 use bonepd_ct::pipeline::apparent::{Load, SolveParams};
 use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build};

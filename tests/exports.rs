@@ -114,7 +114,7 @@ fn exported_lattices_of_mixed_tissue_store_the_energy_of_the_lattice() {
             let u: Vec<[f64; 3]> = (0..sites.len())
                 .map(|s| [1, 2, 3].map(|c| ((s * 7 + c * 13) % 31) as f64 * 1e-4))
                 .collect();
-            let exact = Lattice::new(&sites, moduli).energy(&u);
+            let exact = Lattice::new(sites.clone(), moduli).energy(&u);
             let written = |bins: usize| {
                 let tissue = lammps::Tissue {
                     young_mpa: 700.0,

@@ -61,7 +61,7 @@ fn take(target: &Path, spacing_mm: Option<[f64; 3]>) -> bool {
         }
         _ => {}
     }
-    let needs = estimate::estimate(target, spacing_mm, &Recipe::default());
+    let needs = estimate::estimate(target, spacing_mm, &Recipe::default()).unwrap();
     assert!(needs.memory_mib > 0.0, "{needs:?}");
     let _ = extent::of(target);
     let _ = info::info(target);

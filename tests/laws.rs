@@ -54,10 +54,7 @@ fn lattice_row(structure: Structure, boundary: Boundary, poisson: f64) -> Model 
         boundary,
         registration_mm: [0.0; 3],
     };
-    // A row lives as long as the test program, so its sites may, too.
-    let sites = Box::leak(Box::new(
-        build(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap(),
-    ));
+    let sites = build(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap();
     assert!(
         sites.len() > 100,
         "{structure:?} {boundary:?}: {} sites",
@@ -69,7 +66,7 @@ fn lattice_row(structure: Structure, boundary: Boundary, poisson: f64) -> Model 
         .iter()
         .map(|&i| sites.frame.position_mm(i))
         .collect();
-    let twin = Lattice::new(sites, moduli);
+    let twin = Lattice::new(sites.clone(), moduli);
     Model {
         name: format!("{} {} ν={poisson}", structure.name(), boundary.name()),
         operator: Box::new(Lattice::new(sites, moduli)),
@@ -144,9 +141,7 @@ fn connected_row(poisson: f64) -> Model {
         boundary: Boundary::Graded,
         registration_mm: [0.0; 3],
     };
-    let pieces = Box::leak(Box::new(
-        build_connected(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap(),
-    ));
+    let pieces = build_connected(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap();
     assert!(pieces.len() > 100, "{} pieces", pieces.len());
     let moduli = Moduli::new(Structure::Sc, 0.04, 1000.0, poisson).unwrap();
     let positions = pieces
@@ -154,7 +149,7 @@ fn connected_row(poisson: f64) -> Model {
         .iter()
         .map(|&i| pieces.frame.position_mm(i))
         .collect();
-    let twin = ConnectedLattice::new(pieces, moduli);
+    let twin = ConnectedLattice::new(pieces.clone(), moduli);
     Model {
         name: format!("sc graded in pieces ν={poisson}"),
         operator: Box::new(ConnectedLattice::new(pieces, moduli)),

@@ -64,7 +64,7 @@ fn a_fully_bonded_site_has_the_solids_stiffness() {
         let site = innermost(&sites);
         for nu in POISSONS {
             let model = Lattice::new(
-                &sites,
+                sites.clone(),
                 Moduli::new(structure, LP_MM, YOUNG_MPA, nu).unwrap(),
             );
             let twice_density =
@@ -104,7 +104,7 @@ fn an_affine_field_is_in_equilibrium_inside() {
         let site = innermost(&sites);
         for nu in POISSONS {
             let model = Lattice::new(
-                &sites,
+                sites.clone(),
                 Moduli::new(structure, LP_MM, YOUNG_MPA, nu).unwrap(),
             );
             let mut force = vec![[0.0; 3]; sites.len()];
@@ -145,7 +145,7 @@ fn a_graded_lattice_of_solid_bone_has_its_stiffness() {
         .collect();
     for nu in POISSONS {
         let moduli = Moduli::new(Structure::Sc, LP_MM, YOUNG_MPA, nu).unwrap();
-        let model = ConnectedLattice::new(&pieces, moduli);
+        let model = ConnectedLattice::new(pieces.clone(), moduli);
         let lambda = YOUNG_MPA * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
         let mu = YOUNG_MPA / (2.0 * (1.0 + nu));
         let trace: f64 = (0..3).map(|a| strain[a][a]).sum();

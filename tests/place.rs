@@ -5,7 +5,7 @@ use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::image::nifti;
 use bonepd_ct::measure::fabric::principal;
 use bonepd_ct::pipeline::apparent::SolveParams;
-use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::segment::{Align, AlignBox, SegmentParams, SegmentSummary, Voi, segment};
 use bonepd_ct::volume::{Specimen, Volume};
 use std::f64::consts::PI;

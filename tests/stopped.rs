@@ -10,7 +10,7 @@ use bonepd_ct::operator::held::{Constrained, Held};
 use bonepd_ct::par::dot;
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::Integration;
-use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::{Ends, SolveParams};
 use bonepd_ct::solver::cg::jacobi::Jacobi;
 use bonepd_ct::volume::{Specimen, Volume};

@@ -152,7 +152,12 @@ fn percent(x: f64) -> String {
 }
 
 /// Says what came of it; where the target is missed, so do the rows, here and in the results.
-fn finish(scan: &mut OpenScan, mut rows: Vec<Row>, target: f64, session: &Session) -> Result<Found> {
+fn finish(
+    scan: &mut OpenScan,
+    mut rows: Vec<Row>,
+    target: f64,
+    session: &Session,
+) -> Result<Found> {
     if session.dry_run || rows.iter().all(Row::is_disconnected) {
         return Ok(Found { rows, met: true });
     }

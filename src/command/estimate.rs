@@ -59,11 +59,7 @@ impl fmt::Display for Estimate {
 ///
 /// # Errors
 /// Settings that fit no scan.
-pub fn estimate(
-    input: &Path,
-    spacing_mm: Option<[f64; 3]>,
-    recipe: &Recipe,
-) -> Result<Estimate> {
+pub fn estimate(input: &Path, spacing_mm: Option<[f64; 3]>, recipe: &Recipe) -> Result<Estimate> {
     let extent = extent::of(input);
     let voxels = match (recipe.segment.crop, extent) {
         (Some(crop), _) => Some(crop.map(|[first, end]| end.saturating_sub(first))),
@@ -162,7 +158,11 @@ fn kept_bytes(specimen: &Specimen, params: &SolveParams) -> f64 {
 ///
 /// # Errors
 /// A lattice that needs more than is free.
-pub fn refuse_lattice_that_does_not_fit(job: &Job, prepared: Prepared, params: &SolveParams) -> Result<()> {
+pub fn refuse_lattice_that_does_not_fit(
+    job: &Job,
+    prepared: Prepared,
+    params: &SolveParams,
+) -> Result<()> {
     let cost = job.cost(params, Known::Volume(prepared))?;
     refuse("lattice", cost.bytes[0] * BUILT, cost.resolution)
 }

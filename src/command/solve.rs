@@ -185,7 +185,10 @@ impl OpenScan {
             tissue: &self.tissue,
         };
         let meter = Meter::start();
-        let bar = session.bar(1000, &format!("{} {} mm", name(&blank.key), blank.key.lp_mm));
+        let bar = session.bar(
+            1000,
+            &format!("{} {} mm", name(&blank.key), blank.key.lp_mm),
+        );
         let loads = if params.load == Load::Stiffness { 6 } else { 1 };
         let solution = job.solve(prepared, params, &mut |load, step| {
             show(&bar, [load, loads], step, params.tolerance);

@@ -118,11 +118,15 @@ impl Coarsen for Springs<'_> {
     }
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        self.lattice.double.springs(&self.lattice.sites, sites, x, y);
+        self.lattice
+            .double
+            .springs(&self.lattice.sites, sites, x, y);
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
-        self.lattice.single.springs(&self.lattice.sites, sites, x, y);
+        self.lattice
+            .single
+            .springs(&self.lattice.sites, sites, x, y);
     }
 
     /// Of one spring, `(u_i − u_j)² <= 2 u_i² + 2 u_j²`.

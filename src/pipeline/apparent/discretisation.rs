@@ -29,7 +29,12 @@ pub trait Discretisation: Sized {
     type Case: Copy + Send + Sync + 'static;
 
     /// Fills in the settings of a row that say how the specimen is discretised.
-    fn label(case: &Self::Case, specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings;
+    fn label(
+        case: &Self::Case,
+        specimen: &Specimen,
+        params: &SolveParams,
+        key: Settings,
+    ) -> Settings;
 
     /// What a solve takes, from what is known of the bone.
     ///

@@ -12,6 +12,7 @@ use crate::pipeline::apparent::mechanisms::mechanisms;
 use crate::pipeline::apparent::params::{Load, SolveParams};
 use crate::pipeline::apparent::solved::Solved;
 use crate::pipeline::apparent::stiffness::{Stiffness, stiffness};
+use crate::pipeline::apparent::tissue::Tissue;
 use crate::result::settings::Settings;
 use crate::volume::Specimen;
 
@@ -69,6 +70,21 @@ impl Job {
         observe: &mut Observe,
     ) -> Result<JobResult> {
         (self.solve)(prepared, params, observe)
+    }
+
+    /// The same from the specimen alone, for a single solve.
+    ///
+    /// # Errors
+    /// Settings that are not usable or do not fit the specimen.
+    pub fn solve_specimen(
+        &self,
+        specimen: &Specimen,
+        params: &SolveParams,
+        observe: &mut Observe,
+    ) -> Result<JobResult> {
+        params.check()?;
+        let tissue = &Tissue::of(specimen, params)?;
+        self.solve(Prepared { specimen, tissue }, params, observe)
     }
 }
 

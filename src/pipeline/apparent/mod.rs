@@ -16,12 +16,10 @@ pub mod tissue;
 pub mod voxel_fe;
 
 use crate::error::Result;
-use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::job::Job;
 use crate::pipeline::apparent::lattice::connected::ConnectedModel;
 use crate::pipeline::apparent::lattice::sites::SiteModel;
 use crate::pipeline::apparent::solved::Solved;
-use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::VoxelModel;
 use crate::pipeline::lattice::{Boundary, Case, LatticeParams};
 use crate::solver::cg::CgStep;
@@ -33,7 +31,7 @@ pub use params::{Conditions, Ends, Load, Method, SolveParams};
 pub fn jobs(lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {
     match params.method {
         Method::Lattice => lattices.cases().into_iter().map(of_lattice).collect(),
-        Method::VoxelFe => vec![Job::of::<VoxelModel>(())],
+        Method::VoxelFe => vec![of_voxels()],
     }
 }
 
@@ -45,6 +43,11 @@ pub fn of_lattice(case: Case) -> Job {
     }
 }
 
+/// The solve by one hexahedron per voxel, or finer or coarser ones.
+pub fn of_voxels() -> Job {
+    Job::of::<VoxelModel>(())
+}
+
 /// Solves one lattice of a specimen under one load.
 ///
 /// # Errors
@@ -53,35 +56,21 @@ pub fn solve_lattice(
     specimen: &Specimen,
     case: &Case,
     params: &SolveParams,
-    observe: impl FnMut(CgStep),
+    mut observe: impl FnMut(CgStep),
 ) -> Result<Solved> {
-    solve_one(&of_lattice(*case), specimen, params, observe)
+    let solution = of_lattice(*case).solve_specimen(specimen, params, &mut |_, s| observe(s))?;
+    Ok(solution.modulus()?.0)
 }
 
-/// Solves a specimen with one hexahedron per voxel, or finer or coarser ones, under one load.
+/// Solves a specimen by voxel elements under one load.
 ///
 /// # Errors
 /// Settings that do not fit the specimen.
 pub fn solve_voxels(
     specimen: &Specimen,
     params: &SolveParams,
-    observe: impl FnMut(CgStep),
-) -> Result<Solved> {
-    solve_one(&Job::of::<VoxelModel>(()), specimen, params, observe)
-}
-
-fn solve_one(
-    job: &Job,
-    specimen: &Specimen,
-    params: &SolveParams,
     mut observe: impl FnMut(CgStep),
 ) -> Result<Solved> {
-    params.check()?;
-    let tissue = Tissue::of(specimen, params)?;
-    let prepared = Prepared {
-        specimen,
-        tissue: &tissue,
-    };
-    let solution = job.solve(prepared, params, &mut |_, step| observe(step))?;
+    let solution = of_voxels().solve_specimen(specimen, params, &mut |_, s| observe(s))?;
     Ok(solution.modulus()?.0)
 }

@@ -128,7 +128,7 @@ fn loops_pull_as_bonds_do() {
             let sites = sites(structure, dense, weighted);
             assert!(sites.len() > 64 && sites.weights.is_some() == weighted);
             let moduli = Moduli::new(structure, 0.1, 100.0, 0.3).unwrap();
-            let model = Lattice::new(&sites, moduli);
+            let model = Lattice::new(sites.clone(), moduli);
             let u = numbers(sites.len(), |v| v);
             let single = numbers(sites.len(), |v| v as f32);
             let exact = bond_by_bond(&model, &u);

@@ -34,11 +34,7 @@ const MOST_PER_SITE: f64 = 430.0;
 const S_PER_SITE: f64 = 5e-6;
 
 /// What a solve takes; `count` yields its bytes from the bone.
-pub fn of(
-    case: &Case,
-    known: Known,
-    count: impl FnOnce(Prepared) -> Result<f64>,
-) -> Result<Cost> {
+pub fn of(case: &Case, known: Known, count: impl FnOnce(Prepared) -> Result<f64>) -> Result<Cost> {
     let cell_mm3 = case.structure.cell_volume() * case.lp_mm.powi(3);
     let volume_mm3 = match known {
         Known::Header { volume_mm3, .. } => volume_mm3,

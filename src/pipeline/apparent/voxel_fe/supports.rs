@@ -97,4 +97,3 @@ pub fn grid_places(mesh: &VoxelMesh) -> Vec<[i32; 3]> {
         .map(|node| mesh.indices(node).map(|v| v as i32))
         .collect()
 }
-

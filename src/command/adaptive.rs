@@ -8,7 +8,7 @@ use crate::command::solve::{OpenScan, in_words};
 use crate::error::Result;
 use crate::machine::session::Session;
 use crate::pipeline::apparent::{Method, SolveParams};
-use crate::pipeline::lattice::{Boundary, LatticeParams, Structure};
+use crate::pipeline::lattice::{BoundaryWord, LatticeParams, Structure};
 use crate::record::error_target_note::Missed;
 use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
 use crate::result::row::Row;
@@ -65,7 +65,7 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         lp_mm: LP_OVER_THICKNESS
             .map(|f| (1e4 * f * thickness.min(0.1 * shortest)).round() / 1e4)
             .to_vec(),
-        boundary: vec![Boundary::Graded],
+        boundary: vec![BoundaryWord::Connected],
         ..LatticeParams::default()
     };
     if lattices.lp_mm.iter().all(|lp| *lp > 0.0) {

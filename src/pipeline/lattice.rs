@@ -8,6 +8,7 @@ pub use crate::discretisation::lattice::stencil::Structure;
 use crate::discretisation::lattice::tissue::stiffen;
 use crate::error::{Error, Result};
 use crate::grid::Axis;
+use crate::result::settings::{BoundaryRule, CellType};
 use crate::volume::Specimen;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +18,7 @@ use serde::{Deserialize, Serialize};
 pub struct LatticeParams {
     pub structure: Vec<Structure>,
     pub lp_mm: Vec<f64>,
-    pub boundary: Vec<Boundary>,
+    pub boundary: Vec<BoundaryWord>,
     /// Offset of the lattice in mm.
     pub registration_mm: [f64; 3],
 }
@@ -27,7 +28,7 @@ impl Default for LatticeParams {
         LatticeParams {
             structure: vec![Structure::Sc],
             lp_mm: vec![0.06, 0.08, 0.10, 0.12],
-            boundary: vec![Boundary::Firm, Boundary::Floppy],
+            boundary: vec![BoundaryWord::Firm, BoundaryWord::Floppy],
             registration_mm: [0.0; 3],
         }
     }
@@ -52,6 +53,11 @@ impl LatticeParams {
                 "the paper uses 0.06, 0.08, 0.10, 0.12",
             ));
         }
+        for &structure in &self.structure {
+            for word in &self.boundary {
+                word.of(structure)?;
+            }
+        }
         if self.registration_mm.iter().any(|r| !r.is_finite()) {
             return Err(Error::setting(
                 "lattice.registration_mm",
@@ -60,6 +66,47 @@ impl LatticeParams {
             ));
         }
         Ok(())
+    }
+}
+
+/// A boundary as settings name it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BoundaryWord {
+    Firm,
+    Floppy,
+    Connected,
+    Weighted,
+    /// The older word for both: connected on SC, weighted on BCC and FCC.
+    Graded,
+}
+
+impl BoundaryWord {
+    /// The boundary that is meant on a structure.
+    ///
+    /// # Errors
+    /// One that the structure does not have.
+    pub fn of(self, structure: Structure) -> Result<Boundary> {
+        match (self, structure) {
+            (BoundaryWord::Firm, _) => Ok(Boundary::Firm),
+            (BoundaryWord::Floppy, _) => Ok(Boundary::Floppy),
+            (BoundaryWord::Connected | BoundaryWord::Graded, Structure::Sc) => {
+                Ok(Boundary::Connected)
+            }
+            (BoundaryWord::Weighted | BoundaryWord::Graded, _) if structure != Structure::Sc => {
+                Ok(Boundary::Weighted)
+            }
+            (BoundaryWord::Connected, _) => Err(Error::setting(
+                "lattice.boundary",
+                format!("connected is a method of sc lattices: cells of {} lattices overlap", structure.name()),
+                "use --structure sc, or weighted (sites weighted by bone fraction) on bcc and fcc",
+            )),
+            _ => Err(Error::setting(
+                "lattice.boundary",
+                "weighted sc lattices are refused: sites weighted by bone fraction join struts that do not touch (E_app up to 37 % too high where LP is the strut thickness)",
+                "use connected on sc, or weighted on bcc and fcc",
+            )),
+        }
     }
 }
 
@@ -73,7 +120,34 @@ pub struct Case {
 }
 
 impl LatticeParams {
-    /// All lattices asked for: structures, then lattice parameters from coarse to fine, then boundaries, floppy before
+    /// The boundaries of a structure, in the order of their rows.
+    fn boundaries(&self, structure: Structure) -> impl Iterator<Item = Boundary> {
+        let named = |boundary: &Boundary| {
+            let mut words = self.boundary.iter();
+            words.any(|word| word.of(structure).is_ok_and(|named| named == *boundary))
+        };
+        let order = [
+            Boundary::Floppy,
+            Boundary::Connected,
+            Boundary::Weighted,
+            Boundary::Firm,
+        ];
+        order.into_iter().filter(named).collect::<Vec<_>>().into_iter()
+    }
+
+    /// What the older word `graded` means on these structures, where it could be mistaken.
+    pub fn note(&self) -> Option<String> {
+        let weighted = |s: &&Structure| **s != Structure::Sc;
+        let names: Vec<&str> = self.structure.iter().filter(weighted).map(|s| s.name()).collect();
+        (self.boundary.contains(&BoundaryWord::Graded) && !names.is_empty()).then(|| {
+            format!(
+                "graded on {} is the lattice weighted by bone fraction (--boundary weighted), another method than the connected components of graded on sc (--boundary connected)",
+                names.join(" and ")
+            )
+        })
+    }
+
+    /// All lattices of the settings: structures, then lattice parameters from coarse to fine, then boundaries, floppy before
     /// firm.
     pub fn cases(&self) -> Vec<Case> {
         let mut lps = self.lp_mm.clone();
@@ -81,16 +155,14 @@ impl LatticeParams {
         let mut cases = Vec::new();
         for &structure in &self.structure {
             for &lp_mm in &lps {
-                for boundary in [Boundary::Floppy, Boundary::Graded, Boundary::Firm] {
-                    if self.boundary.contains(&boundary) {
-                        let registration_mm = self.registration_mm;
-                        cases.push(Case {
-                            structure,
-                            lp_mm,
-                            boundary,
-                            registration_mm,
-                        });
-                    }
+                for boundary in self.boundaries(structure) {
+                    let registration_mm = self.registration_mm;
+                    cases.push(Case {
+                        structure,
+                        lp_mm,
+                        boundary,
+                        registration_mm,
+                    });
                 }
             }
         }
@@ -101,13 +173,8 @@ impl LatticeParams {
 impl Case {
     /// Part of the names of its files: `sc-firm-0.06`.
     pub fn stem(&self) -> String {
-        let (structure, boundary) = (self.structure.name(), self.boundary.name());
-        format!("{structure}-{boundary}-{}", self.lp_mm)
-    }
-
-    /// Whether its sites are connected pieces of bone: graded SC lattices.
-    pub fn is_connected(&self) -> bool {
-        self.boundary == Boundary::Graded && self.structure == Structure::Sc
+        let boundary = BoundaryRule::from(self.boundary).name();
+        format!("{}-{boundary}-{}", self.structure.name(), self.lp_mm)
     }
 }
 
@@ -196,14 +263,14 @@ fn lay(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Fr
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LatticeSummary {
     pub structure: Structure,
-    pub boundary: Boundary,
+    pub boundary: BoundaryRule,
     pub lp_mm: f64,
     pub sites: usize,
     pub bonds: usize,
     pub fully_coordinated_sites: usize,
     /// Sites without a path of bonds to both grips.
     pub dropped_sites: usize,
-    /// Volume of the sites' cells (graded: their bone) over TV.
+    /// Volume of the sites' cells (connected, weighted: of their bone) over TV.
     pub lattice_bv_tv: f64,
 }
 
@@ -214,7 +281,7 @@ pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSumm
         .map_or(sites.len() as f64, |w| w.iter().sum());
     LatticeSummary {
         structure: case.structure,
-        boundary: case.boundary,
+        boundary: case.boundary.into(),
         lp_mm: case.lp_mm,
         sites: sites.len(),
         bonds: sites.bonds(),
@@ -241,7 +308,7 @@ pub fn summarise_connected(
     };
     LatticeSummary {
         structure: case.structure,
-        boundary: case.boundary,
+        boundary: case.boundary.into(),
         lp_mm: case.lp_mm,
         sites: pieces.len(),
         bonds: pieces.pairs().count(),
@@ -255,9 +322,9 @@ impl LatticeSummary {
     /// One line for a person.
     pub fn in_words(&self) -> String {
         format!(
-            "{} {:<7} {:>6} mm  {:>9} sites  {:>10} bonds  {:>9} fully coordinated  {:>6} dropped  lattice BV/TV {:.4}",
+            "{} {:<9} {:>6} mm  {:>9} sites  {:>10} bonds  {:>9} fully coordinated  {:>6} dropped  lattice BV/TV {:.4}",
             self.structure.name(),
-            self.boundary.name(),
+            self.boundary.method_name(CellType::Lattice(self.structure)),
             self.lp_mm,
             self.sites,
             self.bonds,

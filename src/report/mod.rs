@@ -11,7 +11,6 @@ mod sample;
 pub mod statistics;
 pub mod table;
 
-use crate::discretisation::lattice::placement::Boundary;
 use crate::result::row::Row;
 use crate::result::settings::{BoundaryRule, Method};
 use figure::Figure;
@@ -128,9 +127,9 @@ impl Model {
     /// None for a lattice without a boundary, which no table holds that this program wrote.
     pub fn of(row: &Row) -> Option<Model> {
         Some(match (row.key.boundary, row.key.method) {
-            (Some(BoundaryRule::Sites(Boundary::Floppy)), _) => Model::Floppy,
-            (Some(BoundaryRule::Sites(Boundary::Firm)), _) => Model::Firm,
-            (Some(BoundaryRule::Sites(Boundary::Graded)), _) => Model::Graded,
+            (Some(BoundaryRule::Floppy), _) => Model::Floppy,
+            (Some(BoundaryRule::Firm), _) => Model::Firm,
+            (Some(BoundaryRule::Graded), _) => Model::Graded,
             (Some(BoundaryRule::Ffb), _) => Model::Ffb,
             (Some(BoundaryRule::Extrapolated), Method::Lattice) => Model::GradedLimit,
             (Some(BoundaryRule::Extrapolated), Method::VoxelFe) => Model::VoxelFeLimit,

@@ -38,8 +38,8 @@ pub fn jobs(lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {
 /// The solve of one lattice.
 pub fn of_lattice(case: Case) -> Job {
     match case.boundary {
-        Boundary::Graded if case.is_connected() => Job::of::<ConnectedModel>(case),
-        _ => Job::of::<SiteModel>(case),
+        Boundary::Connected => Job::of::<ConnectedModel>(case),
+        Boundary::Firm | Boundary::Floppy | Boundary::Weighted => Job::of::<SiteModel>(case),
     }
 }
 

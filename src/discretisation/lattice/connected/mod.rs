@@ -186,7 +186,7 @@ mod tests {
             &grid,
             Structure::Sc,
             lp,
-            Boundary::Graded,
+            Boundary::Connected,
             Axis::Z,
             [0.0; 3],
         )

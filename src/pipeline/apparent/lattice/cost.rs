@@ -62,7 +62,7 @@ fn bounds(specimen: &Specimen, case: &Case) -> [f64; 2] {
     // Where little of a place's cell, or only its neighbours', must be bone, any place can be a site.
     let most = match case.boundary {
         Boundary::Floppy => 1.2 * solid,
-        Boundary::Firm | Boundary::Graded => specimen.tv_mm3 / cell,
+        Boundary::Firm | Boundary::Connected | Boundary::Weighted => specimen.tv_mm3 / cell,
     };
     [
         places.max(LEAST_PER_SITE * solid),

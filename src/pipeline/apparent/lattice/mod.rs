@@ -29,7 +29,7 @@ fn label(key: Settings, case: &Case) -> Settings {
     Settings {
         method: Method::Lattice,
         structure: CellType::Lattice(case.structure),
-        boundary: Some(BoundaryRule::Sites(case.boundary)),
+        boundary: Some(BoundaryRule::from(case.boundary)),
         lp_mm: case.lp_mm,
         registration_mm: Some(case.registration_mm),
         ..key

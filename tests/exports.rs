@@ -106,7 +106,7 @@ fn exported_lattices_of_mixed_tissue_store_the_energy_of_the_lattice() {
             .collect(),
         (0..voxels).map(|i| 0.4 + (i % 101) as f32 / 80.0).collect(),
     ];
-    for boundary in [Boundary::Floppy, Boundary::Graded] {
+    for boundary in [Boundary::Floppy, Boundary::Weighted] {
         for tissue in &tissues {
             let case = case(boundary);
             let sites = build_of(&specimen, Some(tissue), &case, Axis::Z, 0.0).unwrap();
@@ -217,7 +217,7 @@ fn every_element_of_an_inp_has_the_material_of_its_voxel() {
 fn vtk_has_as_many_bytes_as_its_counts_ask_for() {
     let sites = build(
         &crate::laws::irregular_specimen(),
-        &case(Boundary::Graded),
+        &case(Boundary::Weighted),
         Axis::Z,
         0.0,
     )

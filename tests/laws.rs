@@ -7,7 +7,7 @@ use bonepd_ct::operator::held::{Constrained, Held};
 use bonepd_ct::par::dot;
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::{Integration, stiffness};
-use bonepd_ct::physics::hex8::graded::Graded;
+use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
 use bonepd_ct::physics::lattice::connected::ConnectedLattice;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
 use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build, build_connected};

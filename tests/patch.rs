@@ -127,7 +127,7 @@ fn a_graded_lattice_of_solid_bone_has_its_stiffness() {
     let case = Case {
         structure: Structure::Sc,
         lp_mm: LP_MM,
-        boundary: Boundary::Graded,
+        boundary: Boundary::Connected,
         registration_mm: [0.0; 3],
     };
     let pieces = build_connected(&block(), &case, Axis::Z, 0.0).unwrap();

@@ -10,7 +10,7 @@ use bonepd_ct::operator::held::Held;
 use bonepd_ct::operator::probe::probe;
 use bonepd_ct::operator::sparse::Sparse;
 use bonepd_ct::physics::hex8::element::Integration;
-use bonepd_ct::physics::hex8::graded::Graded;
+use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
 use bonepd_ct::pipeline::apparent::discretisation::Prepared;
 use bonepd_ct::pipeline::apparent::solve_lattice;
 use bonepd_ct::pipeline::apparent::solve_voxels;
@@ -68,7 +68,7 @@ fn poisson(poisson: f64) -> SolveParams {
 
 /// The list. Each is small enough that a run to 1e-12 and a factorisation take moments.
 fn cases() -> Vec<Case> {
-    use Boundary::{Firm, Floppy, Graded};
+    use Boundary::{Connected, Firm, Floppy};
     use Model::{Lattice, Voxels};
     use Structure::{Bcc, Sc};
     let mut cases = Vec::new();
@@ -102,7 +102,7 @@ fn cases() -> Vec<Case> {
             );
         }
     }
-    for boundary in [Firm, Floppy, Graded] {
+    for boundary in [Firm, Floppy, Connected] {
         add(
             "struts 2 voxels thick",
             thin(),
@@ -298,9 +298,9 @@ fn solve(case: &Case, params: &SolveParams) -> Result<Solved, bonepd_ct::error::
 }
 
 fn outcome(case: &Case) -> Outcome {
-    // ConnectedSites of graded lattices share places on the grid, which the count cannot tell apart.
+    // Sites of connected lattices share places on the grid, which the count cannot tell apart.
     let counted = SolveParams {
-        mechanisms: !matches!(case.model, Model::Lattice(_, Boundary::Graded, _)),
+        mechanisms: !matches!(case.model, Model::Lattice(_, Boundary::Connected, _)),
         ..case.params.clone()
     };
     let solved = solve(case, &counted).unwrap();
@@ -464,7 +464,7 @@ fn contrast(soft: f32) -> (usize, f64, f64) {
     let held = supports::held(&mesh, grips, &poisson(0.3));
     let start = supports::bar(&mesh, grips, length);
     let factor = |e: usize| if bone[e] == 1 { 1.0 } else { soft };
-    let model = Graded::new(mesh, 1000.0, 0.3, Integration::Full, factor);
+    let model = Heterogeneous::new(mesh, 1000.0, 0.3, Integration::Full, factor);
     let amg = Amg::new(&model, &held, &AmgParams::new(grid.spacing_mm));
     let run = |energy_tolerance| {
         let params = CgParams {

@@ -1,6 +1,6 @@
 //! Owns `solve --error`: resolutions tried from cheap to dear until the stated error meets its target.
 //!
-//! First three graded lattices (LP from the strut thickness to half of it), then pairs of voxel-FE solves whose elements
+//! First three connected lattices (LP from the strut thickness to half of it), then pairs of voxel-FE solves whose elements
 //! differ by a factor of two, beginning at the coarsest pair that can be expected to suffice.
 
 use crate::command::ladder::{PAIRS, element_mm, suffices, voxel_fe};

@@ -14,7 +14,7 @@ use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::{SolveParams, of_lattice};
 use crate::pipeline::lattice::{
-    Case, LatticeParams, LatticeSummary, build, build_connected, build_of, summarise,
+    Boundary, Case, LatticeParams, LatticeSummary, build, build_connected, build_of, summarise,
     summarise_connected,
 };
 use crate::record::specimen;
@@ -102,13 +102,16 @@ pub fn lattice(
         specimen: &specimen,
         tissue: &tissue,
     };
+    if let Some(note) = params.note() {
+        session.say(note);
+    }
     let mut lattices = Vec::new();
     for case in params.cases() {
         refuse_lattice_that_does_not_fit(&of_lattice(case), prepared, &exports.tissue)?;
-        let summary = if case.is_connected() {
-            let pieces = build_connected(&specimen, &case, Axis::Z, 0.0)?;
-            written.pieces(&case, &pieces)?;
-            summarise_connected(&specimen, &case, &pieces)
+        let summary = if case.boundary == Boundary::Connected {
+            let sites = build_connected(&specimen, &case, Axis::Z, 0.0)?;
+            written.components(&case, &sites)?;
+            summarise_connected(&specimen, &case, &sites)
         } else {
             let sites = build(&specimen, &case, Axis::Z, 0.0)?;
             match &factors {
@@ -174,11 +177,11 @@ impl Written<'_> {
         Ok(())
     }
 
-    fn pieces(&self, case: &Case, pieces: &ConnectedSites) -> Result<()> {
+    fn components(&self, case: &Case, sites: &ConnectedSites) -> Result<()> {
         for format in self.formats {
             match format {
-                Export::Vtk => vtk::write_connected(&self.path(case, "vtk"), pieces)?,
-                Export::Lammps => return Err(lammps::pieces()),
+                Export::Vtk => vtk::write_connected(&self.path(case, "vtk"), sites)?,
+                Export::Lammps => return Err(lammps::connected()),
             }
         }
         Ok(())

@@ -110,6 +110,10 @@ impl OpenScan {
                 (job, row)
             })
             .collect();
+        let of_lattices = jobs.iter().any(|(_, blank)| blank.key.boundary.is_some());
+        if let Some(note) = lattices.note().filter(|_| of_lattices) {
+            session.say(note);
+        }
         self.warn_of_coarse(jobs.iter().map(|(_, blank)| blank), session);
         let mut rows = Vec::new();
         for (job, blank) in &jobs {

@@ -79,16 +79,16 @@ impl<O: Coarsen> MixedPrecision for O {
         sum
     }
 
-    fn each_part(
+    fn for_each_chunk(
         &self,
         x: &[[f64; 3]],
         out: &mut [[f32; 3]],
-        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+        consume: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
         each_chunk(out, CHUNK, |first, out| {
             let mut image = vec![[0.0; 3]; out.len()];
             self.rows_f64(first..first + out.len(), x, &mut image);
-            take(first, &image, out)
+            consume(first, &image, out)
         })
     }
 }

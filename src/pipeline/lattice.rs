@@ -2,10 +2,10 @@
 
 use crate::discretisation::lattice::connected::ConnectedSites;
 pub use crate::discretisation::lattice::placement::Boundary;
-use crate::discretisation::lattice::placement::{Frame, weigh};
+use crate::discretisation::lattice::placement::{Frame, site_weights};
 use crate::discretisation::lattice::sites::{Grips, Sites};
 pub use crate::discretisation::lattice::stencil::Structure;
-use crate::discretisation::lattice::tissue::stiffen;
+use crate::discretisation::lattice::tissue::scale_by_tissue;
 use crate::error::{Error, Result};
 use crate::grid::Axis;
 use crate::result::settings::{BoundaryRule, CellType};
@@ -98,7 +98,10 @@ impl BoundaryWord {
             }
             (BoundaryWord::Connected, _) => Err(Error::setting(
                 "lattice.boundary",
-                format!("connected is a method of sc lattices: cells of {} lattices overlap", structure.name()),
+                format!(
+                    "connected is a method of sc lattices: cells of {} lattices overlap",
+                    structure.name()
+                ),
                 "use --structure sc, or weighted (sites weighted by bone fraction) on bcc and fcc",
             )),
             _ => Err(Error::setting(
@@ -132,13 +135,22 @@ impl LatticeParams {
             Boundary::Weighted,
             Boundary::Firm,
         ];
-        order.into_iter().filter(named).collect::<Vec<_>>().into_iter()
+        order
+            .into_iter()
+            .filter(named)
+            .collect::<Vec<_>>()
+            .into_iter()
     }
 
     /// What the older word `graded` means on these structures, where it could be mistaken.
     pub fn note(&self) -> Option<String> {
         let weighted = |s: &&Structure| **s != Structure::Sc;
-        let names: Vec<&str> = self.structure.iter().filter(weighted).map(|s| s.name()).collect();
+        let names: Vec<&str> = self
+            .structure
+            .iter()
+            .filter(weighted)
+            .map(|s| s.name())
+            .collect();
         (self.boundary.contains(&BoundaryWord::Graded) && !names.is_empty()).then(|| {
             format!(
                 "graded on {} is the lattice weighted by bone fraction (--boundary weighted), another method than the connected components of graded on sc (--boundary connected)",
@@ -194,29 +206,29 @@ pub fn build_of(
     axis: Axis,
     grip_mm: f64,
 ) -> Result<Sites> {
-    let (frame, grips) = lay(specimen, case, axis, grip_mm)?;
+    let (frame, grips) = place(specimen, case, axis, grip_mm)?;
     let weights = weights(specimen, tissue, case, &frame);
     Ok(Sites::connect(frame, weights, grips))
 }
 
 /// Of every candidate of a frame.
 fn weights(specimen: &Specimen, tissue: Option<&[f32]>, case: &Case, frame: &Frame) -> Vec<f32> {
-    let mut weights = weigh(frame, &specimen.bone, case.boundary);
+    let mut weights = site_weights(frame, &specimen.bone, case.boundary);
     if let Some(tissue) = tissue {
-        stiffen(frame, &specimen.bone, tissue, &mut weights);
+        scale_by_tissue(frame, &specimen.bone, tissue, &mut weights);
     }
     weights
 }
 
 /// What each site of a lattice takes of `tissue`, a value per voxel, times its weight: as its springs are made by [`build_of`].
-pub fn values_of(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sites) -> Vec<f64> {
+pub fn site_values(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sites) -> Vec<f64> {
     let frame = &sites.frame;
     let weights = weights(specimen, Some(tissue), case, frame);
     let value = |at: &[i32; 3]| frame.candidate(*at).map_or(0.0, |c| f64::from(weights[c]));
     sites.indices.iter().map(value).collect()
 }
 
-/// [`build`] for a graded SC lattice: a site for each connected piece of bone in a cell.
+/// [`build`] for a connected lattice: a site for each connected component of bone in a cell.
 ///
 /// # Errors
 /// As [`build`].
@@ -232,11 +244,11 @@ pub fn build_connected(
         registration_mm: case.registration_mm.map(|r| r - lp * (r / lp).round()),
         ..*case
     };
-    let (frame, grips) = lay(specimen, &wrapped, axis, grip_mm)?;
+    let (frame, grips) = place(specimen, &wrapped, axis, grip_mm)?;
     Ok(ConnectedSites::connect(frame, &specimen.bone, grips))
 }
 
-fn lay(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Frame, Grips)> {
+fn place(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Frame, Grips)> {
     let frame = Frame::new(
         &specimen.bone.grid,
         case.structure,
@@ -293,27 +305,27 @@ pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSumm
     }
 }
 
-/// [`summarise`] for a lattice of pieces. Fully coordinated are those with a neighbour along every bond.
+/// [`summarise`] for a connected lattice. Fully coordinated are those with a neighbour along every bond.
 pub fn summarise_connected(
     specimen: &Specimen,
     case: &Case,
-    pieces: &ConnectedSites,
+    sites: &ConnectedSites,
 ) -> LatticeSummary {
-    let bone: f64 = pieces.fractions.iter().map(|&f| f64::from(f)).sum();
+    let bone: f64 = sites.fractions.iter().map(|&f| f64::from(f)).sum();
     let directions = case.structure.stencil().coordination();
     let whole = |s: &usize| {
         let mut met = vec![false; directions];
-        pieces.bonds.of(*s).for_each(|(_, b, _)| met[b] = true);
+        sites.bonds.of(*s).for_each(|(_, b, _)| met[b] = true);
         met.into_iter().all(|met| met)
     };
     LatticeSummary {
         structure: case.structure,
         boundary: case.boundary.into(),
         lp_mm: case.lp_mm,
-        sites: pieces.len(),
-        bonds: pieces.pairs().count(),
-        fully_coordinated_sites: (0..pieces.len()).filter(whole).count(),
-        dropped_sites: pieces.dropped,
+        sites: sites.len(),
+        bonds: sites.pairs().count(),
+        fully_coordinated_sites: (0..sites.len()).filter(whole).count(),
+        dropped_sites: sites.dropped,
         lattice_bv_tv: bone * case.lp_mm.powi(3) / specimen.tv_mm3,
     }
 }

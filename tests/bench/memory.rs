@@ -91,11 +91,11 @@ fn main() {
             (Structure::Bcc, Boundary::Floppy),
             (Structure::Bcc, Boundary::Firm),
             (Structure::Fcc, Boundary::Floppy),
-            (Structure::Sc, Boundary::Graded),
+            (Structure::Sc, Boundary::Connected),
         ] {
             let lp_mm = match (structure, boundary) {
                 (Structure::Bcc, _) => 0.02 * 2f64.cbrt(),
-                (_, Boundary::Firm | Boundary::Graded) => 0.03,
+                (_, Boundary::Firm | Boundary::Connected) => 0.03,
                 _ => 0.02,
             };
             let case = Case {

@@ -174,9 +174,9 @@ impl Frame {
 }
 
 /// Weight of every candidate: 0 where no site exists, 1 for firm and floppy sites, the bone fraction for weighted ones.
-pub fn weigh(frame: &Frame, bone: &Volume<u8>, boundary: Boundary) -> Vec<f32> {
+pub fn site_weights(frame: &Frame, bone: &Volume<u8>, boundary: Boundary) -> Vec<f32> {
     if boundary == Boundary::Firm {
-        return near_bone::weigh(frame, bone);
+        return near_bone::site_weights(frame, bone);
     }
     let weight = |indices: [i32; 3]| match boundary {
         _ if !frame.structure.allows(indices) => 0.0,

@@ -5,7 +5,7 @@
 
 pub mod element;
 pub mod fields;
-pub mod graded;
+pub mod heterogeneous;
 mod kernel;
 mod stencils;
 
@@ -164,8 +164,8 @@ mod tests {
     }
 
     #[test]
-    fn forces_of_graded_elements_are_those_of_each_times_its_factor() {
-        let op = graded([11, 7, 6], 2);
+    fn forces_of_heterogeneous_elements_are_those_of_each_times_its_factor() {
+        let op = heterogeneous([11, 7, 6], 2);
         let x = vector(op.sites());
         let exact = by_elements(op.mesh(), &x, factor);
         let scale = exact.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
@@ -188,7 +188,9 @@ mod tests {
         let mesh = random([11, 7, 6], 50, 5).mesh;
         let x = vector(mesh.len());
         let mixed =
-            graded::Graded::of_kinds(mesh.clone(), 1000.0, &kinds, factor, |e| second(e).into());
+            heterogeneous::Heterogeneous::of_kinds(mesh.clone(), 1000.0, &kinds, factor, |e| {
+                second(e).into()
+            });
         check_rows(&mixed);
         let mut exact = vec![[0.0; 3]; x.len()];
         for (kind, &(nu, rule)) in kinds.iter().enumerate() {
@@ -199,7 +201,7 @@ mod tests {
                     0.0
                 }
             };
-            let part = graded::Graded::new(mesh.clone(), 1000.0, nu, rule, own);
+            let part = heterogeneous::Heterogeneous::new(mesh.clone(), 1000.0, nu, rule, own);
             let mut y = vec![[0.0; 3]; x.len()];
             part.apply(&x, &mut y);
             for (sum, y) in exact.iter_mut().zip(&y) {
@@ -220,7 +222,7 @@ mod tests {
         let mut y = x(op.sites());
         op.rows_f32(0..y.len(), &x(op.sites()), &mut y);
         assert!(y.iter().flatten().all(|f| *f == 0.0));
-        let op = graded([11, 7, 6], 2);
+        let op = heterogeneous([11, 7, 6], 2);
         let mut y = x(op.sites());
         op.rows_f32(0..y.len(), &x(op.sites()), &mut y);
         assert!(y.iter().flatten().all(|f| *f == 0.0));
@@ -230,13 +232,13 @@ mod tests {
     fn rows_are_what_the_operator_applies() {
         let op = random([9, 6, 5], 50, 3);
         check_rows(&op);
-        check_rows(&graded([9, 6, 5], 3));
+        check_rows(&heterogeneous([9, 6, 5], 3));
     }
 
     /// Factors that differ from element to element.
-    fn graded(n: [usize; 3], seed: u64) -> graded::Graded {
+    fn heterogeneous(n: [usize; 3], seed: u64) -> heterogeneous::Heterogeneous {
         let mesh = random(n, 50, seed).mesh;
-        graded::Graded::new(mesh, 1000.0, 0.3, Integration::Full, factor)
+        heterogeneous::Heterogeneous::new(mesh, 1000.0, 0.3, Integration::Full, factor)
     }
 
     fn factor(element: usize) -> f32 {

@@ -1,4 +1,4 @@
-//! Owns the graded lattice: the lattice element with a share of a whole bond's stiffness on each bond.
+//! Owns the lattice of connected components: the lattice element with a share of a whole bond's stiffness on each bond.
 //!
 //! `U = Σ_i [ ½ Σ_s k_s Σ_j σ_ij dl_ij² + ½ T Σ_s (N_s / Σ_j σ_ij) (Σ_j σ_ij dl_ij)² ]` with shares `σ` and `N_s` bonds
 //! of a whole site in shell `s`. Where all shares are 1 this is the uniform lattice, and by Cauchy and Schwarz it is never
@@ -28,7 +28,7 @@ struct Direction {
     half: f64,
 }
 
-/// The linearised graded lattice as an operator: `K u` is the gradient of the energy. N and mm.
+/// The linearised lattice of connected components as an operator: `K u` is the gradient of the energy. N and mm.
 pub struct ConnectedLattice {
     pub sites: ConnectedSites,
     moduli: Moduli,
@@ -236,22 +236,22 @@ impl MixedPrecision for ConnectedLattice {
         sum
     }
 
-    fn each_part(
+    fn for_each_chunk(
         &self,
         x: &[[f64; 3]],
         out: &mut [[f32; 3]],
-        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+        consume: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
         let pressures = self.all_pressures(x);
         each_chunk(out, PORTION, |first, out| {
             let sites = first..first + out.len();
             let image: Vec<[f64; 3]> = sites.map(|s| self.row(x, &pressures, s)).collect();
-            take(first, &image, out)
+            consume(first, &image, out)
         })
     }
 }
 
-/// What multigrid sees of a graded lattice: its springs.
+/// What multigrid sees of a lattice of connected components: its springs.
 pub struct ConnectedSprings<'a>(pub &'a ConnectedLattice);
 
 impl ConnectedSprings<'_> {

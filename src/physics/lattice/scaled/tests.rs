@@ -111,7 +111,7 @@ fn by_loops<H: Shape, S: Precision>(
         let theta = &mut t[range.clone()];
         let all = theta.as_flattened().iter().zip(sums.as_flattened());
         assert!(all.into_iter().all(|(a, b)| near(*a, *b)));
-        scaled.weigh(range, theta);
+        scaled.scale_by_weights(range, theta);
     }
     for range in [0..n / 3, n / 3..n] {
         let y = &mut y[range.clone()];

@@ -65,14 +65,14 @@ impl Discretisation for ConnectedModel {
         if blend.springs.is_some() {
             return Err(Error::setting(
                 "solve.material",
-                "graded SC lattices are of one tissue",
+                "connected (graded SC) lattices are of one tissue",
                 "use firm and floppy lattices, or add --method voxel-fe",
             ));
         }
         if params.mechanisms {
             return Err(Error::setting(
                 "mechanisms",
-                "pieces of bone that share a graded lattice's site share its place on the grid, too",
+                "components of bone in one cell of a connected (graded SC) lattice share its place on the grid",
                 "count mechanisms on firm and floppy lattices or with --method voxel-fe",
             ));
         }

@@ -15,7 +15,7 @@ use crate::pipeline::apparent::lattice::stress::Stress;
 use crate::pipeline::apparent::lattice::{Placed, cost, label, refuse_unit_strains};
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::solved::Moduli;
-use crate::pipeline::lattice::{Boundary, Case, build_of, values_of};
+use crate::pipeline::lattice::{Boundary, Case, build_of, site_values};
 use crate::result::settings::Settings;
 use crate::solver::cg::CgInfo;
 use crate::volume::Specimen;
@@ -86,7 +86,7 @@ impl Discretisation for SiteModel {
         let lattice = match volumetric {
             None => Lattice::new(sites, moduli),
             Some(tissue) => {
-                let by_site = values_of(specimen, &tissue, case, &sites);
+                let by_site = site_values(specimen, &tissue, case, &sites);
                 let volumetric = by_site.into_iter().map(|v| v * moduli.t).collect();
                 Lattice::with_volumetric(sites, moduli, volumetric)
             }

@@ -1,4 +1,4 @@
-//! Owns the voxel elements of a specimen: their size, equal or graded, and how they are integrated.
+//! Owns the voxel elements of a specimen: their size, homogeneous or heterogeneous, and how they are integrated.
 
 use crate::discretisation::voxels::{Planes, VoxelMesh};
 use crate::error::{Error, Result};
@@ -8,7 +8,7 @@ use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::physics::hex8::Hex8;
 use crate::physics::hex8::element::Integration;
-use crate::physics::hex8::graded::Graded;
+use crate::physics::hex8::heterogeneous::Heterogeneous;
 use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::tissue::{Mixed, Tissue};
@@ -32,8 +32,8 @@ pub enum Keep {
 
 /// One brick per voxel, or finer or coarser ones.
 pub enum Bricks {
-    Equal(Hex8),
-    Graded(Graded),
+    Homogeneous(Hex8),
+    Heterogeneous(Heterogeneous),
 }
 
 impl Bricks {
@@ -44,7 +44,9 @@ impl Bricks {
         let solid = match tissue {
             Tissue::Uniform(solid) => solid,
             Tissue::Mixed(mixed) => {
-                return Ok(Bricks::Graded(of_mixed(specimen, mixed, params, keep)?));
+                return Ok(Bricks::Heterogeneous(of_mixed(
+                    specimen, mixed, params, keep,
+                )?));
             }
         };
         let (young, nu) = (solid.young_mpa, solid.poisson);
@@ -54,27 +56,27 @@ impl Bricks {
             let values = fractions.as_slice();
             let bone = |f: &f32| *f >= LEAST_FRACTION;
             let mesh = mesh(fractions.grid, values, bone, params, keep)?;
-            let graded = Graded::new(mesh, young, nu, rule, |e| values[e]);
-            return Ok(Bricks::Graded(graded));
+            let heterogeneous = Heterogeneous::new(mesh, young, nu, rule, |e| values[e]);
+            return Ok(Bricks::Heterogeneous(heterogeneous));
         }
         let refined = (params.refine > 1).then(|| resample::refine(&specimen.bone, params.refine));
         let bone = refined.as_ref().unwrap_or(&specimen.bone);
         let mesh = mesh(bone.grid, bone.as_slice(), |b| *b != 0, params, keep)?;
-        Ok(Bricks::Equal(Hex8::new(mesh, young, nu, rule)))
+        Ok(Bricks::Homogeneous(Hex8::new(mesh, young, nu, rule)))
     }
 
     /// Factor and kind of the element whose corner of smallest x, y, z is a node.
     pub fn stiffness_of(&self, node: usize) -> (f32, u8) {
         match self {
-            Bricks::Equal(_) => (1.0, 0),
-            Bricks::Graded(model) => model.stiffness_of(node),
+            Bricks::Homogeneous(_) => (1.0, 0),
+            Bricks::Heterogeneous(model) => model.stiffness_of(node),
         }
     }
 
     pub fn mesh(&self) -> &VoxelMesh {
         match self {
-            Bricks::Equal(model) => &model.mesh,
-            Bricks::Graded(model) => model.mesh(),
+            Bricks::Homogeneous(model) => &model.mesh,
+            Bricks::Heterogeneous(model) => model.mesh(),
         }
     }
 }
@@ -93,7 +95,7 @@ fn of_mixed(
     mixed: &Mixed,
     params: &SolveParams,
     keep: Keep,
-) -> Result<Graded> {
+) -> Result<Heterogeneous> {
     let kinds: Vec<(f64, Integration)> = mixed.poissons.iter().map(|&nu| (nu, rule(nu))).collect();
     let young = mixed.mean_mpa;
     if params.coarsen > 1 {
@@ -109,7 +111,7 @@ fn of_mixed(
         let bone = |f: &f32| *f >= LEAST_FRACTION;
         let mesh = mesh(fractions.grid, fractions.as_slice(), bone, params, keep)?;
         let factor = |e: usize| moduli.as_slice()[e];
-        return Ok(Graded::of_kinds(mesh, young, &kinds, factor, |_| 0));
+        return Ok(Heterogeneous::of_kinds(mesh, young, &kinds, factor, |_| 0));
     }
     let n = params.refine;
     let refined = (n > 1).then(|| resample::refine(&specimen.bone, n));
@@ -122,7 +124,7 @@ fn of_mixed(
     };
     let factor = |e: usize| mixed.factor[voxel(e)];
     let kind = |e: usize| mixed.kind.get(voxel(e)).copied().unwrap_or(0);
-    Ok(Graded::of_kinds(mesh, young, &kinds, factor, kind))
+    Ok(Heterogeneous::of_kinds(mesh, young, &kinds, factor, kind))
 }
 
 fn mesh<T: Sync>(
@@ -148,15 +150,15 @@ impl Operator<3> for Bricks {
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         match self {
-            Bricks::Equal(model) => model.apply(x, y),
-            Bricks::Graded(model) => model.apply(x, y),
+            Bricks::Homogeneous(model) => model.apply(x, y),
+            Bricks::Heterogeneous(model) => model.apply(x, y),
         }
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
         match self {
-            Bricks::Equal(model) => model.diagonal(d),
-            Bricks::Graded(model) => model.diagonal(d),
+            Bricks::Homogeneous(model) => model.diagonal(d),
+            Bricks::Heterogeneous(model) => model.diagonal(d),
         }
     }
 }
@@ -164,15 +166,15 @@ impl Operator<3> for Bricks {
 impl Coarsen for Bricks {
     fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
         match self {
-            Bricks::Equal(model) => model.positions(sites, x),
-            Bricks::Graded(model) => model.positions(sites, x),
+            Bricks::Homogeneous(model) => model.positions(sites, x),
+            Bricks::Heterogeneous(model) => model.positions(sites, x),
         }
     }
 
     fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
         match self {
-            Bricks::Equal(model) => model.each_row(sites, visit),
-            Bricks::Graded(model) => model.each_row(sites, visit),
+            Bricks::Homogeneous(model) => model.each_row(sites, visit),
+            Bricks::Heterogeneous(model) => model.each_row(sites, visit),
         }
     }
 
@@ -182,22 +184,22 @@ impl Coarsen for Bricks {
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         match self {
-            Bricks::Equal(model) => model.rows_f64(sites, x, y),
-            Bricks::Graded(model) => model.rows_f64(sites, x, y),
+            Bricks::Homogeneous(model) => model.rows_f64(sites, x, y),
+            Bricks::Heterogeneous(model) => model.rows_f64(sites, x, y),
         }
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
         match self {
-            Bricks::Equal(model) => model.rows_f32(sites, x, y),
-            Bricks::Graded(model) => model.rows_f32(sites, x, y),
+            Bricks::Homogeneous(model) => model.rows_f32(sites, x, y),
+            Bricks::Heterogeneous(model) => model.rows_f32(sites, x, y),
         }
     }
 
     fn eigenvalue_bound(&self) -> f64 {
         match self {
-            Bricks::Equal(model) => model.eigenvalue_bound(),
-            Bricks::Graded(model) => model.eigenvalue_bound(),
+            Bricks::Homogeneous(model) => model.eigenvalue_bound(),
+            Bricks::Heterogeneous(model) => model.eigenvalue_bound(),
         }
     }
 }

@@ -23,7 +23,7 @@ pub struct Elements<'a> {
 }
 
 /// [`rows_f64`] with a factor per element.
-pub fn graded_f64(
+pub fn heterogeneous_f64(
     tables: &[Stencils<f64>],
     elements: Elements,
     nodes: Range<usize>,
@@ -33,16 +33,16 @@ pub fn graded_f64(
     match simd::isa() {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has what the function asks for.
-        Isa::Avx512 => unsafe { graded_avx512(tables, elements, nodes, x, y) },
+        Isa::Avx512 => unsafe { heterogeneous_avx512(tables, elements, nodes, x, y) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Isa::Avx2 => unsafe { graded_avx2_f64(tables, elements, nodes, x, y) },
-        _ => gather_graded::<simd::PlainF64>(tables, elements, nodes, x, y),
+        Isa::Avx2 => unsafe { heterogeneous_avx2_f64(tables, elements, nodes, x, y) },
+        _ => gather_heterogeneous::<simd::PlainF64>(tables, elements, nodes, x, y),
     }
 }
 
 /// The same in single precision.
-pub fn graded_f32(
+pub fn heterogeneous_f32(
     tables: &[Stencils<f32>],
     elements: Elements,
     nodes: Range<usize>,
@@ -52,49 +52,49 @@ pub fn graded_f32(
     match simd::isa() {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has what the function asks for.
-        Isa::Avx512 | Isa::Avx2 => unsafe { graded_avx2_f32(tables, elements, nodes, x, y) },
-        _ => gather_graded::<simd::PlainF32>(tables, elements, nodes, x, y),
+        Isa::Avx512 | Isa::Avx2 => unsafe { heterogeneous_avx2_f32(tables, elements, nodes, x, y) },
+        _ => gather_heterogeneous::<simd::PlainF32>(tables, elements, nodes, x, y),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx2,fma")]
-fn graded_avx512(
+fn heterogeneous_avx512(
     t: &[Stencils<f64>],
     e: Elements,
     n: Range<usize>,
     x: &[[f64; 3]],
     y: &mut [[f64; 3]],
 ) {
-    gather_graded::<simd::Avx512F64>(t, e, n, x, y);
+    gather_heterogeneous::<simd::Avx512F64>(t, e, n, x, y);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn graded_avx2_f64(
+fn heterogeneous_avx2_f64(
     t: &[Stencils<f64>],
     e: Elements,
     n: Range<usize>,
     x: &[[f64; 3]],
     y: &mut [[f64; 3]],
 ) {
-    gather_graded::<simd::Avx2F64>(t, e, n, x, y);
+    gather_heterogeneous::<simd::Avx2F64>(t, e, n, x, y);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn graded_avx2_f32(
+fn heterogeneous_avx2_f32(
     t: &[Stencils<f32>],
     e: Elements,
     n: Range<usize>,
     x: &[[f32; 3]],
     y: &mut [[f32; 3]],
 ) {
-    gather_graded::<simd::Avx2F32>(t, e, n, x, y);
+    gather_heterogeneous::<simd::Avx2F32>(t, e, n, x, y);
 }
 
 #[inline(always)]
-fn gather_graded<L: Lanes<S: From<f32> + Mul<Output = L::S>>>(
+fn gather_heterogeneous<L: Lanes<S: From<f32> + Mul<Output = L::S>>>(
     tables: &[Stencils<L::S>],
     elements: Elements,
     nodes: Range<usize>,
@@ -113,7 +113,9 @@ fn gather_graded<L: Lanes<S: From<f32> + Mul<Output = L::S>>>(
             // SAFETY: as for equal elements; a row of elements reads two of the same rows and nodes.
             *out = match around {
                 0 => [L::S::default(); 3],
-                _ => unsafe { graded_node::<L>(tables, around, elements, &segment.rows, i, x) },
+                _ => unsafe {
+                    heterogeneous_node::<L>(tables, around, elements, &segment.rows, i, x)
+                },
             };
         }
     }
@@ -148,7 +150,7 @@ impl Elements<'_> {
 /// # Safety
 /// `1 <= rows[r] + i < x.len() − 1` for every row that an element around the node reaches.
 #[inline(always)]
-unsafe fn graded_node<L: Lanes<S: From<f32> + Mul<Output = L::S>>>(
+unsafe fn heterogeneous_node<L: Lanes<S: From<f32> + Mul<Output = L::S>>>(
     tables: &[Stencils<L::S>],
     around: u8,
     elements: Elements,
@@ -156,6 +158,7 @@ unsafe fn graded_node<L: Lanes<S: From<f32> + Mul<Output = L::S>>>(
     i: usize,
     x: &[[L::S; 3]],
 ) -> [L::S; 3] {
+    // SAFETY: the caller's promise holds for every row that is read.
     unsafe {
         // Inside bone a node costs what it would with one modulus for all.
         if let Some((factor, kind)) = elements.alike(around, rows, i) {

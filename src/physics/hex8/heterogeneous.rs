@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// [`super::Hex8`] with one factor per element.
-pub struct Graded {
+pub struct Heterogeneous {
     mesh: VoxelMesh,
     /// By kind of element.
     double: Vec<Stencils<f64>>,
@@ -26,7 +26,7 @@ pub struct Graded {
     kind: Vec<u8>,
 }
 
-impl Graded {
+impl Heterogeneous {
     /// `factor` yields an element's factor, above 0, from its index in the mesh's grid.
     pub fn new(
         mesh: VoxelMesh,
@@ -35,7 +35,7 @@ impl Graded {
         rule: Integration,
         factor: impl Fn(usize) -> f32,
     ) -> Self {
-        Graded::of_kinds(mesh, young_mpa, &[(poisson, rule)], factor, |_| 0)
+        Heterogeneous::of_kinds(mesh, young_mpa, &[(poisson, rule)], factor, |_| 0)
     }
 
     /// `kind` yields which of the Poisson's ratios (at most 256) an element has.
@@ -63,7 +63,7 @@ impl Graded {
             .map(|&(nu, rule)| element::stiffness(h, young_mpa, nu, rule))
             .collect();
         let double: Vec<_> = matrices.iter().map(Stencils::new).collect();
-        Graded {
+        Heterogeneous {
             single: double.iter().map(Stencils::to_f32).collect(),
             couplings: double.iter().map(Couplings::new).collect(),
             eigenvalue_bound: matrices
@@ -96,7 +96,7 @@ impl Graded {
     }
 }
 
-impl Graded {
+impl Heterogeneous {
     /// The elements around node `i` of a segment: the bit of each, its factor and kind.
     fn around<'a>(
         &'a self,
@@ -127,7 +127,7 @@ impl Graded {
     }
 }
 
-impl Operator<3> for Graded {
+impl Operator<3> for Heterogeneous {
     fn sites(&self) -> usize {
         self.factor.len()
     }
@@ -156,7 +156,7 @@ impl Operator<3> for Graded {
     }
 }
 
-impl Coarsen for Graded {
+impl Coarsen for Heterogeneous {
     fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
         super::positions(&self.mesh, sites, x);
     }
@@ -198,11 +198,11 @@ impl Coarsen for Graded {
     }
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        kernel::graded_f64(&self.double, self.elements(), sites, x, y);
+        kernel::heterogeneous_f64(&self.double, self.elements(), sites, x, y);
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
-        kernel::graded_f32(&self.single, self.elements(), sites, x, y);
+        kernel::heterogeneous_f32(&self.single, self.elements(), sites, x, y);
     }
 
     fn eigenvalue_bound(&self) -> f64 {

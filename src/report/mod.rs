@@ -124,17 +124,17 @@ impl Model {
         Model::VoxelFeLimit,
     ];
 
-    /// None for a lattice without a boundary, which no table holds that this program wrote.
+    /// None for a method without a column: its rows stand in the table of results alone.
     pub fn of(row: &Row) -> Option<Model> {
         Some(match (row.key.boundary, row.key.method) {
             (Some(BoundaryRule::Floppy), _) => Model::Floppy,
             (Some(BoundaryRule::Firm), _) => Model::Firm,
             (Some(BoundaryRule::Graded), _) => Model::Graded,
             (Some(BoundaryRule::Ffb), _) => Model::Ffb,
-            (Some(BoundaryRule::Extrapolated), Method::Lattice) => Model::GradedLimit,
             (Some(BoundaryRule::Extrapolated), Method::VoxelFe) => Model::VoxelFeLimit,
+            (Some(BoundaryRule::Extrapolated), _) => Model::GradedLimit,
             (None, Method::VoxelFe) => Model::VoxelFe,
-            (None, Method::Lattice) => return None,
+            (None, _) => return None,
         })
     }
 

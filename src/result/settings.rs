@@ -14,11 +14,11 @@ pub enum Method {
 }
 
 impl Method {
+    /// The words of settings and results, in the order of the variants.
+    pub const WORDS: &[&str] = &["lattice", "voxel-fe"];
+
     pub fn name(self) -> &'static str {
-        match self {
-            Method::Lattice => "lattice",
-            Method::VoxelFe => "voxel-fe",
-        }
+        Method::WORDS[self as usize]
     }
 }
 

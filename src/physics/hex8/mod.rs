@@ -13,7 +13,7 @@ use crate::discretisation::voxels::VoxelMesh;
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::par;
-use element::Integration;
+use element::{ElementMatrix, Integration};
 use rayon::prelude::*;
 use std::ops::Range;
 use stencils::{Couplings, Stencils};
@@ -32,12 +32,17 @@ impl Hex8 {
     /// `young_mpa` in MPa, `−1 < poisson < ½`.
     pub fn new(mesh: VoxelMesh, young_mpa: f64, poisson: f64, rule: Integration) -> Self {
         let k = element::stiffness(mesh.grid.spacing_mm, young_mpa, poisson, rule);
-        let double = Stencils::new(&k);
+        Hex8::of_matrix(mesh, &k)
+    }
+
+    /// Elements that all have the stiffness matrix `k`, in N/mm.
+    pub fn of_matrix(mesh: VoxelMesh, k: &ElementMatrix) -> Self {
+        let double = Stencils::new(k);
         Hex8 {
             mesh,
             single: double.to_f32(),
             couplings: Couplings::new(&double),
-            eigenvalue_bound: element::eigenvalue_bound(&k),
+            eigenvalue_bound: element::eigenvalue_bound(k),
             double,
         }
     }

@@ -5,6 +5,7 @@ mod apparent;
 mod cli;
 mod cohort;
 mod exports;
+mod extension;
 mod fields;
 mod formats;
 mod fuzz;

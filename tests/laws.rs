@@ -239,13 +239,12 @@ fn element_row<O: Coarsen + 'static>(
     Model::of_rows(name.into(), operator, positions, Box::new(energy))
 }
 
+fn spacing() -> [f64; 3] {
+    irregular_specimen().bone.grid.spacing_mm
+}
+
 fn matrix(poisson: f64, rule: Integration) -> ElementMatrix {
-    stiffness(
-        irregular_specimen().bone.grid.spacing_mm,
-        1000.0,
-        poisson,
-        rule,
-    )
+    stiffness(spacing(), 1000.0, poisson, rule)
 }
 
 /// Elements of one material.

@@ -10,7 +10,7 @@ use crate::physics::hex8::Hex8;
 use crate::physics::hex8::element::Integration;
 use crate::physics::hex8::heterogeneous::Heterogeneous;
 use crate::pipeline::apparent::discretisation::Prepared;
-use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::params::{Load, SolveParams};
 use crate::pipeline::apparent::tissue::{Mixed, Tissue};
 use crate::volume::Specimen;
 use std::ops::Range;
@@ -28,6 +28,16 @@ pub enum Keep {
     BetweenGrips,
     /// Those joined to a face of the volume.
     AtFaces,
+}
+
+impl Keep {
+    /// Those that a load needs.
+    pub fn under(load: Load) -> Keep {
+        match load {
+            Load::Stiffness => Keep::AtFaces,
+            Load::Uniaxial | Load::Confined => Keep::BetweenGrips,
+        }
+    }
 }
 
 /// One brick per voxel, or finer or coarser ones.
@@ -59,9 +69,7 @@ impl Bricks {
             let heterogeneous = Heterogeneous::new(mesh, young, nu, rule, |e| values[e]);
             return Ok(Bricks::Heterogeneous(heterogeneous));
         }
-        let refined = (params.refine > 1).then(|| resample::refine(&specimen.bone, params.refine));
-        let bone = refined.as_ref().unwrap_or(&specimen.bone);
-        let mesh = mesh(bone.grid, bone.as_slice(), |b| *b != 0, params, keep)?;
+        let mesh = whole_mesh(specimen, params, keep)?;
         Ok(Bricks::Homogeneous(Hex8::new(mesh, young, nu, rule)))
     }
 
@@ -79,6 +87,16 @@ impl Bricks {
             Bricks::Heterogeneous(model) => model.mesh(),
         }
     }
+}
+
+/// One element per voxel, or finer ones.
+///
+/// # Errors
+/// Grips that meet, or too many nodes.
+pub fn whole_mesh(specimen: &Specimen, params: &SolveParams, keep: Keep) -> Result<VoxelMesh> {
+    let refined = (params.refine > 1).then(|| resample::refine(&specimen.bone, params.refine));
+    let bone = refined.as_ref().unwrap_or(&specimen.bone);
+    mesh(bone.grid, bone.as_slice(), |b| *b != 0, params, keep)
 }
 
 pub(super) fn rule(poisson: f64) -> Integration {

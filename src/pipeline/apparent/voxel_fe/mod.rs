@@ -31,6 +31,32 @@ pub struct VoxelModel {
     params: SolveParams,
 }
 
+impl VoxelModel {
+    /// The model of these elements of a specimen.
+    ///
+    /// # Errors
+    /// Grips that meet.
+    pub fn of(bricks: Bricks, specimen: &Specimen, params: &SolveParams) -> Result<Self> {
+        let grip_mm = match params.load {
+            Load::Stiffness => 0.0,
+            Load::Uniaxial | Load::Confined => params.grip_mm,
+        };
+        let grid = bricks.mesh().grid;
+        let grips = Planes::within(&grid, params.axis, grip_mm)?;
+        let gauge_mm = (grips.high - grips.low) as f64 * grid.spacing_mm[params.axis.index()];
+        Ok(VoxelModel {
+            bricks,
+            grips,
+            loaded: Loaded {
+                gauge_mm,
+                area_mm2: specimen.area_mm2(params.axis),
+                displacement_mm: params.strain * gauge_mm,
+            },
+            params: params.clone(),
+        })
+    }
+}
+
 impl Discretisation for VoxelModel {
     /// Size and tissue of the elements stand in the settings of the solve.
     type Case = ();
@@ -58,24 +84,8 @@ impl Discretisation for VoxelModel {
     }
 
     fn build(_: &(), prepared: Prepared, params: &SolveParams) -> Result<Self> {
-        let (keep, grip_mm) = match params.load {
-            Load::Stiffness => (Keep::AtFaces, 0.0),
-            Load::Uniaxial | Load::Confined => (Keep::BetweenGrips, params.grip_mm),
-        };
-        let bricks = Bricks::new(prepared, params, keep)?;
-        let grid = bricks.mesh().grid;
-        let grips = Planes::within(&grid, params.axis, grip_mm)?;
-        let gauge_mm = (grips.high - grips.low) as f64 * grid.spacing_mm[params.axis.index()];
-        Ok(VoxelModel {
-            bricks,
-            grips,
-            loaded: Loaded {
-                gauge_mm,
-                area_mm2: prepared.specimen.area_mm2(params.axis),
-                displacement_mm: params.strain * gauge_mm,
-            },
-            params: params.clone(),
-        })
+        let bricks = Bricks::new(prepared, params, Keep::under(params.load))?;
+        VoxelModel::of(bricks, prepared.specimen, params)
     }
 
     fn system(

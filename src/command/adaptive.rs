@@ -36,7 +36,7 @@ pub struct Found {
 pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session) -> Result<Found> {
     let mut scan = OpenScan::open(dir, params, false, session)?;
     if !session.dry_run {
-        // Of an earlier error asked for.
+        // Notes of an earlier target.
         scan.results().renote(Missed::take_back)?;
         if session.force {
             scan.results().clear()?;

@@ -49,7 +49,7 @@ struct Record {
 
 const RECORD: &str = "lattice.json";
 
-/// Builds every lattice asked for from the mask in `dir`, with the end planes along z gripped, writes `dir/lattice.json`
+/// Builds every lattice of the settings from the mask in `dir`, with the end planes along z gripped, writes `dir/lattice.json`
 /// (settings and counts) and one file per lattice and export format.
 pub fn lattice(
     dir: &Path,
@@ -91,7 +91,7 @@ pub fn lattice(
     }
     if exports.formats.contains(&Export::Lammps) {
         session.warn(
-            "LAMMPS data hold bonds alone, and a lattice of bonds alone has a Poisson's ratio of 0.25, whatever the tissue's (0.3 unless told otherwise): hold their results against `solve --poisson 0.25`",
+            "LAMMPS data hold bonds alone, and a lattice of bonds alone has a Poisson's ratio of 0.25, whatever the tissue's (0.3 by default): compare their results with `solve --poisson 0.25`",
         );
     }
     let tissue = Tissue::Uniform(Solid {

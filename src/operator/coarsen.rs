@@ -12,9 +12,9 @@ pub type Block = [[f32; 3]; 3];
 pub type VisitRow<'v, B> = dyn FnMut(usize, &[u32], &[B]) + 'v;
 
 /// An operator on displacements that algebraic multigrid can coarsen. It is never assembled: rows are made when asked
-/// for. All of it is the free operator: supports are told to the solver separately, as held components.
+/// for. All of it is the free operator: supports are passed to the solver separately, as held components.
 ///
-/// Everything is asked for by ranges of sites, on the calling thread, so that whoever asks decides how much of it is
+/// Everything is by ranges of sites, on the calling thread, so that whoever asks decides how much of it is
 /// alive at a time.
 pub trait Coarsen: Operator<3> {
     /// Where sites are, in mm. Rigid motions are made from it.

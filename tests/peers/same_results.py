@@ -3,7 +3,7 @@
 
     python3 tests/peers/same_results.py OLD NEW            # two binaries
 
-Runs `pipelines/quick.toml` on sample_data, voxel elements and both graded lattices on one sample scan, and, where a folder of
+Runs `pipelines/quick.toml` on sample_data, voxel elements and lattices of every kind on one sample scan, and, where a folder of
 slices is given by BONEPD_STACK or lies in ../shared/data/lhdl_3155_D_4_bc, `pipelines/paper.toml` and voxel elements on it.
 Compares every cell of results.csv (and the matrix of stiffness.json) as text, except the clock and the memory (wall_s, peak_mib).
 Exit 1 where a cell differs.
@@ -59,7 +59,7 @@ CASES = {
     "stiffness, mixed": lambda b, o: sample(
         b, o, "--method", "voxel-fe", "--coarsen", "3", "--load", "stiffness", "--conditions", "mixed"
     ),
-    "graded lattices of all structures": lambda b, o: sample(
+    "connected and weighted lattices, by the older word": lambda b, o: sample(
         b, o, "--structure", "sc,bcc,fcc", "--boundary", "graded", "--lp", "0.1,0.15,0.2"
     ),
     "confined and bonded lattices": lambda b, o: sample(

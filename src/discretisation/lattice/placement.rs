@@ -65,7 +65,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Lays candidates of `structure` over `grid`.
+    /// Places candidates of `structure` over `grid`.
     ///
     /// # Errors
     /// A lattice parameter that is not positive, leaves fewer than two planes or no site sideways, or has too many places.

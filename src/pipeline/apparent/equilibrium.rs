@@ -12,7 +12,7 @@ use crate::solver::cg::{CgInfo, CgParams, CgStep};
 pub type Observe<'a> = dyn FnMut(usize, CgStep) + 'a;
 
 /// Displacements in equilibrium under each of the `loads`, which share supports and so one preconditioner: conjugate
-/// gradients with multigrid, or with the diagonal where multigrid breaks down. One load is solved as its item is asked for.
+/// gradients with multigrid, or with the diagonal where multigrid breaks down. Each load is solved when its item is taken.
 pub fn equilibrium<'a, O: MixedPrecision, C: Coarsen, G: Functional<3>>(
     system: &'a System<'_, O, C, G>,
     loads: &'a [usize],

@@ -26,7 +26,7 @@ pub struct FieldVolume {
     pub values: Volume<f32>,
 }
 
-/// What was asked for.
+/// Fields and failure load, as far as the settings ask for them.
 #[derive(Debug, Clone, Default)]
 pub struct Recorded {
     /// On the scan's grid.
@@ -36,7 +36,7 @@ pub struct Recorded {
     pub sites: Option<SiteFields>,
 }
 
-/// What was asked for of a lattice, by site.
+/// Fields of a lattice, by site.
 #[derive(Debug, Clone)]
 pub struct SiteFields {
     /// Places of the sites, from the corner of the specimen.
@@ -49,7 +49,7 @@ pub struct SiteFields {
 }
 
 impl SiteFields {
-    /// Of a solved lattice, as far as `fields` ask for them; None where none is asked for. `energy_nmm` and `fraction` are
+    /// Of a solved lattice, as far as `fields` ask for them; None where they do not. `energy_nmm` and `fraction` are
     /// those of a site.
     pub fn of(
         fields: &[Field],

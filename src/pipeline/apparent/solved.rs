@@ -29,7 +29,7 @@ pub struct Solved {
     pub residual: f64,
     pub ended: Ended,
     pub moduli: Moduli,
-    /// Where asked for.
+    /// Only where the settings ask for a count.
     pub mechanisms: Option<usize>,
 }
 

@@ -126,7 +126,7 @@ fn link(
     let (Some(cell), Some(next)) = (&slab.cells[c], &next_slab.cells[n]) else {
         return;
     };
-    let begun = links[a].len();
+    let first = links[a].len();
     for (&here, &there) in cell.last[a].iter().zip(&next.first[a]) {
         if here == NO_PIECE || there == NO_PIECE {
             continue;
@@ -135,7 +135,7 @@ fn link(
             slab.numbers[c][usize::from(here)],
             next_slab.numbers[n][usize::from(there)],
         ];
-        if !pair.contains(&NO_SITE) && !links[a][begun..].contains(&pair) {
+        if !pair.contains(&NO_SITE) && !links[a][first..].contains(&pair) {
             links[a].push(pair);
         }
     }

@@ -86,7 +86,7 @@ fn by_loops<H: Shape, S: Precision>(
             neighbours: &sites.neighbours,
         };
         let weights = scaled.weights.as_deref();
-        // SAFETY: AVX2 is asked for where `fast` is told.
+        // SAFETY: `fast` is true only where there is AVX2.
         unsafe {
             match fast {
                 #[cfg(target_arch = "x86_64")]

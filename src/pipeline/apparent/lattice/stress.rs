@@ -1,4 +1,4 @@
-//! Owns the stress of a lattice as a functional of its displacements, which a solve can be asked for instead of the energy.
+//! Owns the stress of a lattice as a functional of its displacements, which a solve can have as its goal instead of the energy.
 
 use crate::operator::Functional;
 use crate::par::sum_chunks;
@@ -7,7 +7,7 @@ use crate::physics::lattice::Virial;
 /// The stress of a lattice times its volume, in N mm: a functional of the displacements.
 pub struct Stress<'a, M> {
     pub model: &'a M,
-    /// Which sites count; all where there is none. Made once, as the stress is asked for in every iteration.
+    /// Which sites count; all where there is none. Computed once: every iteration needs the stress.
     pub counts: Option<&'a [bool]>,
 }
 

@@ -6,7 +6,6 @@ use crate::stopped::textbook;
 use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::Operator;
-use bonepd_ct::operator::held::Held;
 use bonepd_ct::operator::probe::probe;
 use bonepd_ct::operator::sparse::Sparse;
 use bonepd_ct::physics::hex8::element::Integration;

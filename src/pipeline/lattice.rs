@@ -346,3 +346,52 @@ impl LatticeSummary {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn params(structure: &[Structure], boundary: &[BoundaryWord]) -> LatticeParams {
+        LatticeParams {
+            structure: structure.to_vec(),
+            lp_mm: vec![0.1],
+            boundary: boundary.to_vec(),
+            ..LatticeParams::default()
+        }
+    }
+
+    #[test]
+    fn the_older_word_means_connected_on_sc_and_weighted_elsewhere() {
+        use BoundaryWord::{Connected, Graded, Weighted};
+        let graded = params(&Structure::ALL, &[Graded]);
+        graded.check().unwrap();
+        let meant: Vec<Boundary> = graded.cases().iter().map(|case| case.boundary).collect();
+        let wanted = [Boundary::Connected, Boundary::Weighted, Boundary::Weighted];
+        assert_eq!(meant, wanted);
+        assert!(graded.note().unwrap().contains("bcc and fcc"));
+        assert_eq!(params(&[Structure::Sc], &[Graded]).note(), None);
+        // Named twice, solved once; files say the older word.
+        let twice = params(&[Structure::Sc], &[Connected, Graded]).cases();
+        assert_eq!(twice, params(&[Structure::Sc], &[Graded]).cases());
+        assert_eq!(twice[0].stem(), "sc-graded-0.1");
+        assert_eq!(
+            params(&[Structure::Bcc], &[Weighted]).cases()[0].stem(),
+            "bcc-graded-0.1"
+        );
+    }
+
+    #[test]
+    fn a_boundary_that_a_structure_does_not_have_is_refused() {
+        let refused = |structure, word| {
+            let words = params(&[structure], &[BoundaryWord::Firm, word]).check();
+            words.unwrap_err().to_string()
+        };
+        let words = refused(Structure::Bcc, BoundaryWord::Connected);
+        assert!(
+            words.contains("weighted") && words.contains("bcc"),
+            "{words}"
+        );
+        let words = refused(Structure::Sc, BoundaryWord::Weighted);
+        assert!(words.contains("use connected on sc"), "{words}");
+    }
+}

@@ -3,7 +3,7 @@
 use bonepd_ct::discretisation::plane::Points;
 use bonepd_ct::discretisation::plane::family::{Family, Stencil};
 use bonepd_ct::operator::Operator;
-use bonepd_ct::operator::nonlinear::{Nonlinear, Staggered};
+use bonepd_ct::operator::nonlinear::Staggered;
 use bonepd_ct::operator::reduction::{Reduction, Value};
 use bonepd_ct::physics::bond_based;
 use bonepd_ct::physics::bond_based::{BondBased, Material, micromodulus_discrete};

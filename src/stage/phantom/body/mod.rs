@@ -1,0 +1,194 @@
+//! Owns analytic bodies: shapes that are known at every point, so that finer voxels show the same body more exactly.
+
+mod foam;
+mod frame;
+mod lattices;
+mod params;
+mod plates;
+pub mod sample;
+mod struts;
+mod surfaces;
+
+pub use params::{BodyKind, BodyParams, Orientation};
+
+use super::PhantomParams;
+use super::waves::Numbers;
+use frame::{Axes, Vec3};
+use lattices::Lattice;
+use plates::{Crack, Plates};
+use rayon::prelude::*;
+use struts::{Strut, Struts};
+use surfaces::{Periodic, Surface};
+
+enum Shape {
+    Periodic(Periodic),
+    Plates(Plates),
+    Struts(Box<Struts>),
+}
+
+/// A solid, infinite but known about the box only. Positions are in mm from the middle of the box.
+pub struct Body {
+    shape: Shape,
+    axes: Axes,
+    /// The surface is where the shape has this value.
+    level_mm: f64,
+    crack: Option<Crack>,
+}
+
+/// Points along the longest edge of the box at which the share of bone is counted.
+const FIT_POINTS: f64 = 64.0;
+
+impl Body {
+    /// The body of these settings, of the volume fraction asked for (before breaks and crack) in its box.
+    pub fn new(params: &PhantomParams, body: &BodyParams) -> Self {
+        let axes = match body.orientation {
+            Orientation::Random => Axes::random(Numbers::new(params.seed, 4)),
+            Orientation::Tilted { tilt, azimuth } => Axes::tilted(tilt, azimuth),
+        };
+        let mut made = Body {
+            shape: shape(params, body, &axes),
+            axes,
+            level_mm: 0.0,
+            crack: None,
+        };
+        made.fit(params, body);
+        let size = params.grid().size_mm();
+        made.crack = (body.crack_mm > 0.0).then(|| {
+            Crack::new(
+                size,
+                body.crack_mm,
+                body.crack_share,
+                Numbers::new(params.seed, 7),
+            )
+        });
+        made
+    }
+
+    /// Negative inside; its size is at most the distance from the surface (mm).
+    pub fn value(&self, p: Vec3) -> f64 {
+        let shape = match &self.shape {
+            Shape::Periodic(periodic) => periodic.value(self.axes.inward(p)),
+            Shape::Plates(plates) => plates.value(self.axes.inward(p)),
+            Shape::Struts(struts) => struts.value(p),
+        };
+        let value = shape - self.level_mm;
+        match &self.crack {
+            Some(crack) => value.max(crack.depth(p)),
+            None => value,
+        }
+    }
+
+    /// Sets the level, or the struts' radius, at which the wanted share of the box is bone.
+    fn fit(&mut self, params: &PhantomParams, body: &BodyParams) {
+        if let Shape::Plates(plates) = &self.shape {
+            self.level_mm = 0.5 * params.bvtv * plates.period_mm;
+            return;
+        }
+        // A new radius changes the fillets too; a fixed number of steps repeats everywhere.
+        for _ in 0..8 {
+            let level = self.level_of(params);
+            let Shape::Struts(struts) = &self.shape else {
+                self.level_mm = level;
+                return;
+            };
+            let radius = (struts.radius_mm + level).max(0.2 * struts.radius_mm);
+            self.shape = shape_of_struts(params, body, &self.axes, radius, false);
+        }
+        if let Shape::Struts(struts) = &self.shape {
+            let radius = struts.radius_mm;
+            self.shape = shape_of_struts(params, body, &self.axes, radius, true);
+        }
+    }
+
+    /// The level below which the wanted share of evenly spread points lies.
+    fn level_of(&self, params: &PhantomParams) -> f64 {
+        let size = params.grid().size_mm();
+        let step = size.into_iter().fold(0.0, f64::max) / FIT_POINTS;
+        let n = size.map(|l| (l / step).ceil() as usize);
+        let at = |i: usize, a: usize| ((i as f64 + 0.5) / n[a] as f64 - 0.5) * size[a];
+        let mut values: Vec<f64> = (0..n[0] * n[1] * n[2])
+            .into_par_iter()
+            .map(|m| {
+                self.value([
+                    at(m % n[0], 0),
+                    at(m / n[0] % n[1], 1),
+                    at(m / (n[0] * n[1]), 2),
+                ])
+            })
+            .collect();
+        let wanted = ((params.bvtv * values.len() as f64) as usize).min(values.len() - 1);
+        *values.select_nth_unstable_by(wanted, f64::total_cmp).1
+    }
+}
+
+fn shape(params: &PhantomParams, body: &BodyParams, axes: &Axes) -> Shape {
+    let numbers = Numbers::new(params.seed, 5);
+    let periodic = |surface, sheet| {
+        Shape::Periodic(Periodic {
+            surface,
+            sheet,
+            cell_mm: body.cell_mm,
+            shift: std::array::from_fn(|a| numbers.uniform(a as u64)),
+        })
+    };
+    match body.kind {
+        BodyKind::GyroidNetwork => periodic(Surface::Gyroid, false),
+        BodyKind::GyroidSheet => periodic(Surface::Gyroid, true),
+        BodyKind::SchwarzPNetwork => periodic(Surface::SchwarzP, false),
+        BodyKind::SchwarzPSheet => periodic(Surface::SchwarzP, true),
+        BodyKind::SchwarzDNetwork => periodic(Surface::SchwarzD, false),
+        BodyKind::SchwarzDSheet => periodic(Surface::SchwarzD, true),
+        BodyKind::Plates => Shape::Plates(Plates {
+            period_mm: body.cell_mm,
+            shift: numbers.uniform(0),
+        }),
+        // A first guess at the radius.
+        _ => shape_of_struts(params, body, axes, 0.1 * body.cell_mm, false),
+    }
+}
+
+fn shape_of_struts(
+    params: &PhantomParams,
+    body: &BodyParams,
+    axes: &Axes,
+    radius_mm: f64,
+    with_breaks: bool,
+) -> Shape {
+    let numbers = Numbers::new(params.seed, 5);
+    let (radii, breaks) = (Numbers::new(params.seed, 6), Numbers::new(params.seed, 8));
+    let half_mm = half_of_all(params, body);
+    let finish = |name: u64, from: Vec3, to: Vec3| Strut {
+        from,
+        to,
+        radius: 1.0 + body.spread * (2.0 * radii.uniform(name) - 1.0),
+        broken: (with_breaks && breaks.uniform(name) < body.broken)
+            .then(|| 0.3 + 0.4 * breaks.uniform(name ^ u64::MAX)),
+    };
+    let lattice = |lattice: Lattice| lattice.struts(body.cell_mm, axes, numbers, half_mm, finish);
+    let struts = match body.kind {
+        BodyKind::Cubic => lattice(Lattice::Cubic),
+        BodyKind::Bcc => lattice(Lattice::Bcc),
+        BodyKind::Octet => lattice(Lattice::Octet),
+        BodyKind::Kelvin => lattice(Lattice::Kelvin),
+        _ => foam::struts(body.cell_mm, numbers, half_mm, finish),
+    };
+    let shares = [body.fillet, body.broken_gap];
+    Shape::Struts(Box::new(Struts::new(struts, radius_mm, shares, half_mm)))
+}
+
+/// Half the edges of a box that holds the scan, turned and moved.
+fn half_of_all(params: &PhantomParams, body: &BodyParams) -> Vec3 {
+    let size = params.grid().size_mm();
+    let wide = match body.turn_degrees == 0.0 {
+        true => [size[0], size[1]],
+        false => [(size[0] * size[0] + size[1] * size[1]).sqrt(); 2],
+    };
+    let margin = 8.0 * params.spacing_mm;
+    [wide[0], wide[1], size[2]].map(|l| 0.5 * l + margin)
+        .iter()
+        .zip(body.shift_mm)
+        .map(|(half, shift)| half + shift.abs())
+        .collect::<Vec<f64>>()
+        .try_into()
+        .unwrap_or([0.0; 3])
+}

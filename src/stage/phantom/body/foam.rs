@@ -81,9 +81,10 @@ fn vertices(seeds: &[Seed], reach_mm: f64) -> Vec<([usize; 4], Vec3)> {
                     let radius = norm(from);
                     let point = plus(seed.at, from);
                     let empty = 2.0 * radius < reach_mm
-                        && near.iter().filter(|s| ![b, c, d].contains(s)).all(|&s| {
-                            norm(minus(seeds[s].at, point)) >= radius
-                        });
+                        && near
+                            .iter()
+                            .filter(|s| ![b, c, d].contains(s))
+                            .all(|&s| norm(minus(seeds[s].at, point)) >= radius);
                     if empty {
                         found.push(([a, b, c, d], point));
                     }
@@ -109,10 +110,7 @@ fn centre([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
         return None;
     }
     let sum = plus(
-        plus(
-            times(cross(b, c), dot(a, a)),
-            times(cross(c, a), dot(b, b)),
-        ),
+        plus(times(cross(b, c), dot(a, a)), times(cross(c, a), dot(b, b))),
         times(cross(a, b), dot(c, c)),
     );
     Some(times(sum, 1.0 / volume))
@@ -134,13 +132,20 @@ mod tests {
         let ends = struts.iter().flat_map(|s| [s.from, s.to]);
         let mut meeting: Vec<(Vec3, usize)> = Vec::new();
         for end in ends.filter(|p| p.iter().all(|x| x.abs() < 1.5)) {
-            match meeting.iter_mut().find(|(p, _)| norm(minus(*p, end)) < 1e-9) {
+            match meeting
+                .iter_mut()
+                .find(|(p, _)| norm(minus(*p, end)) < 1e-9)
+            {
                 Some((_, n)) => *n += 1,
                 None => meeting.push((end, 1)),
             }
         }
         // A Voronoi tessellation of random points has 6.77 vertices a cell, of jittered ones about as many.
-        assert!(meeting.len() > 27 * 5 && meeting.len() < 27 * 8, "{}", meeting.len());
+        assert!(
+            meeting.len() > 27 * 5 && meeting.len() < 27 * 8,
+            "{}",
+            meeting.len()
+        );
         assert!(meeting.iter().all(|(_, n)| *n == 4));
     }
 }

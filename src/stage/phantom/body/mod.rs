@@ -8,6 +8,8 @@ mod plates;
 pub mod sample;
 mod struts;
 mod surfaces;
+#[cfg(test)]
+mod tests;
 
 pub use params::{BodyKind, BodyParams, Orientation};
 
@@ -20,6 +22,7 @@ use rayon::prelude::*;
 use struts::{Strut, Struts};
 use surfaces::{Periodic, Surface};
 
+#[derive(Debug, Clone)]
 enum Shape {
     Periodic(Periodic),
     Plates(Plates),
@@ -27,6 +30,7 @@ enum Shape {
 }
 
 /// A solid, infinite but known about the box only. Positions are in mm from the middle of the box.
+#[derive(Debug, Clone)]
 pub struct Body {
     shape: Shape,
     axes: Axes,
@@ -184,11 +188,6 @@ fn half_of_all(params: &PhantomParams, body: &BodyParams) -> Vec3 {
         false => [(size[0] * size[0] + size[1] * size[1]).sqrt(); 2],
     };
     let margin = 8.0 * params.spacing_mm;
-    [wide[0], wide[1], size[2]].map(|l| 0.5 * l + margin)
-        .iter()
-        .zip(body.shift_mm)
-        .map(|(half, shift)| half + shift.abs())
-        .collect::<Vec<f64>>()
-        .try_into()
-        .unwrap_or([0.0; 3])
+    let half = [wide[0], wide[1], size[2]];
+    std::array::from_fn(|a| 0.5 * half[a] + margin + body.shift_mm[a].abs())
 }

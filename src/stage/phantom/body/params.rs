@@ -21,21 +21,6 @@ pub enum BodyKind {
 }
 
 impl BodyKind {
-    pub const ALL: [(&'static str, BodyKind); 12] = [
-        ("gyroid-network", BodyKind::GyroidNetwork),
-        ("gyroid-sheet", BodyKind::GyroidSheet),
-        ("schwarz-p-network", BodyKind::SchwarzPNetwork),
-        ("schwarz-p-sheet", BodyKind::SchwarzPSheet),
-        ("schwarz-d-network", BodyKind::SchwarzDNetwork),
-        ("schwarz-d-sheet", BodyKind::SchwarzDSheet),
-        ("cubic", BodyKind::Cubic),
-        ("bcc", BodyKind::Bcc),
-        ("octet", BodyKind::Octet),
-        ("kelvin", BodyKind::Kelvin),
-        ("foam", BodyKind::Foam),
-        ("plates", BodyKind::Plates),
-    ];
-
     /// Whether it is made of struts, which may break.
     pub fn has_struts(self) -> bool {
         use BodyKind::{Bcc, Cubic, Foam, Kelvin, Octet};
@@ -99,7 +84,13 @@ impl BodyParams {
         )?;
         if self.kind.has_struts() {
             let least = shortest_mm / 20.0;
-            range("cell-mm", self.cell_mm, least, 2.0 * shortest_mm, "at most 20 cells of struts fit")?;
+            range(
+                "cell-mm",
+                self.cell_mm,
+                least,
+                2.0 * shortest_mm,
+                "at most 20 cells of struts fit",
+            )?;
         } else if self.broken > 0.0 {
             return Err(Error::setting(
                 "broken",
@@ -109,13 +100,49 @@ impl BodyParams {
         }
         range("fillet", self.fillet, 0.0, 2.0, "0.5 is usual")?;
         range("spread", self.spread, 0.0, 0.8, "0.3 is usual for foams")?;
-        range("broken", self.broken, 0.0, 1.0, "give a share of the struts")?;
-        range("broken-gap", self.broken_gap, 0.01, 4.0, "in mean radii of the struts")?;
-        range("crack-mm", self.crack_mm, 0.0, shortest_mm, "a crack is narrower than the box")?;
-        range("crack-share", self.crack_share, 0.0, 1.0, "give a share of the section")?;
+        range(
+            "broken",
+            self.broken,
+            0.0,
+            1.0,
+            "give a share of the struts",
+        )?;
+        range(
+            "broken-gap",
+            self.broken_gap,
+            0.01,
+            4.0,
+            "in mean radii of the struts",
+        )?;
+        range(
+            "crack-mm",
+            self.crack_mm,
+            0.0,
+            shortest_mm,
+            "a crack is narrower than the box",
+        )?;
+        range(
+            "crack-share",
+            self.crack_share,
+            0.0,
+            1.0,
+            "give a share of the section",
+        )?;
         for shift in self.shift_mm {
-            range("shift-voxels", shift, -shortest_mm, shortest_mm, "a share of a voxel is usual")?;
+            range(
+                "shift-voxels",
+                shift,
+                -shortest_mm,
+                shortest_mm,
+                "a share of a voxel is usual",
+            )?;
         }
-        range("turn-degrees", self.turn_degrees, -360.0, 360.0, "give degrees about z")
+        range(
+            "turn-degrees",
+            self.turn_degrees,
+            -360.0,
+            360.0,
+            "give degrees about z",
+        )
     }
 }

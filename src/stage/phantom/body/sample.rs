@@ -1,7 +1,7 @@
 //! Owns how a scanner sees a body: partial volumes, blur, noise, the position of its voxels.
 
-use super::super::waves::{Numbers, turn};
 use super::super::PhantomParams;
+use super::super::waves::{Numbers, turn};
 use super::Body;
 use super::frame::Vec3;
 use crate::grid::Grid;
@@ -108,9 +108,8 @@ pub fn scan(body: &Body, params: &PhantomParams) -> Volume<i16> {
                     for i in 0..grid.n[0] {
                         let share = slice[(j + margin) * wide.n[0] + i + margin];
                         let at = grid.index([i, j, k - margin]) as u64;
-                        let hu = dark
-                            + contrast * f64::from(share)
-                            + params.noise_hu * noise.normal(at);
+                        let hu =
+                            dark + contrast * f64::from(share) + params.noise_hu * noise.normal(at);
                         greys.push(hu.round() as i16);
                     }
                 }

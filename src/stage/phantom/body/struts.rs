@@ -14,6 +14,7 @@ pub struct Strut {
 }
 
 /// Struts and where to find those near a point.
+#[derive(Debug, Clone)]
 pub struct Struts {
     struts: Vec<Strut>,
     pub radius_mm: f64,

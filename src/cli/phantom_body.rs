@@ -1,7 +1,7 @@
 //! `phantom --body`: an analytic body and how it lies in the scan.
 
 use super::words;
-use bonepd_ct::stage::phantom::{BodyKind, BodyParams, Orientation};
+use bonepd_ct::pipeline::phantom::{BodyKind, BodyParams, Orientation};
 use clap::Args;
 
 #[derive(Args)]

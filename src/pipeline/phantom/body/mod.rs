@@ -39,8 +39,16 @@ pub struct Body {
     crack: Option<Crack>,
 }
 
-/// Points along the longest edge of the box at which the share of bone is counted.
-const FIT_POINTS: f64 = 64.0;
+/// Points in the box at which the share of bone is counted.
+const FIT_POINTS: usize = 120_000;
+
+/// They follow an additive recurrence (powers of the inverse of 1.2207…, the root of x⁴ = x + 1), which fills the box
+/// evenly and in step with no lattice.
+const RECURRENCE: Vec3 = [
+    0.819_172_513_396_164,
+    0.671_043_606_703_789,
+    0.549_700_477_901_970,
+];
 
 impl Body {
     /// The body of these settings, of the volume fraction asked for (before breaks and crack) in its box.
@@ -89,7 +97,7 @@ impl Body {
             return;
         }
         // A new radius changes the fillets too; a fixed number of steps repeats everywhere.
-        for _ in 0..8 {
+        for _ in 0..5 {
             let level = self.level_of(params);
             let Shape::Struts(struts) = &self.shape else {
                 self.level_mm = level;
@@ -107,18 +115,10 @@ impl Body {
     /// The level below which the wanted share of evenly spread points lies.
     fn level_of(&self, params: &PhantomParams) -> f64 {
         let size = params.grid().size_mm();
-        let step = size.into_iter().fold(0.0, f64::max) / FIT_POINTS;
-        let n = size.map(|l| (l / step).ceil() as usize);
-        let at = |i: usize, a: usize| ((i as f64 + 0.5) / n[a] as f64 - 0.5) * size[a];
-        let mut values: Vec<f64> = (0..n[0] * n[1] * n[2])
+        let at = |n: usize, a: usize| ((n as f64 * RECURRENCE[a]).fract() - 0.5) * size[a];
+        let mut values: Vec<f64> = (0..FIT_POINTS)
             .into_par_iter()
-            .map(|m| {
-                self.value([
-                    at(m % n[0], 0),
-                    at(m / n[0] % n[1], 1),
-                    at(m / (n[0] * n[1]), 2),
-                ])
-            })
+            .map(|n| self.value([at(n, 0), at(n, 1), at(n, 2)]))
             .collect();
         let wanted = ((params.bvtv * values.len() as f64) as usize).min(values.len() - 1);
         *values.select_nth_unstable_by(wanted, f64::total_cmp).1

@@ -182,7 +182,7 @@ fn a_body_is_seen_by_partial_volumes_and_finer_voxels_show_the_same() {
         fine < 0.25 && (coarse / fine - 1.0).abs() < 0.03,
         "{coarse} {fine}"
     );
-    // No noise: greys are shares of bone over 125 points, and all between the two values.
+    // No noise: greys are shares of bone, and all between the two values.
     let (_, stdout, _) = run(&["info", &at("0.05.nii.gz"), "--json"]);
     let info = json(&stdout);
     assert_eq!(info["grey_min"].as_f64(), Some(-1000.0), "{info}");

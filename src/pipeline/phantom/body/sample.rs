@@ -9,8 +9,9 @@ use crate::mask::gaussian;
 use crate::volume::Volume;
 use rayon::prelude::*;
 
-/// Points along each edge of a voxel whose share in the body is its partial volume.
-const POINTS: usize = 5;
+/// Parts along each edge of a voxel. The share of bone in a part follows from the distance between its middle and the surface: exact
+/// for a surface along the parts' faces.
+const PARTS: usize = 5;
 
 /// From positions in the scan (mm from its first corner) to those in the body (mm from its middle).
 struct Place {
@@ -55,27 +56,28 @@ pub fn partial_volumes(body: &Body, params: &PhantomParams, margin: usize) -> Vo
     let grid = params.grid();
     let place = Place::new(params);
     let h = grid.spacing_mm[0];
-    let half_diagonal = 0.5 * 3f64.sqrt() * h;
-    let offset = |n: usize| ((n as f64 + 0.5) / POINTS as f64 - 0.5) * h;
+    let part = h / PARTS as f64;
+    let half_diagonal = 0.5 * 3f64.sqrt() * (h + part);
+    let offset = |n: usize| ((n as f64 + 0.5) / PARTS as f64 - 0.5) * h;
     let share = |middle: Vec3| {
         let value = body.value(place.of(middle));
         if value.abs() > half_diagonal {
             return if value < 0.0 { 1.0 } else { 0.0 };
         }
-        let mut inside = 0;
-        for k in 0..POINTS {
-            for j in 0..POINTS {
-                for i in 0..POINTS {
+        let mut inside = 0.0;
+        for k in 0..PARTS {
+            for j in 0..PARTS {
+                for i in 0..PARTS {
                     let p = [
                         middle[0] + offset(i),
                         middle[1] + offset(j),
                         middle[2] + offset(k),
                     ];
-                    inside += usize::from(body.value(place.of(p)) < 0.0);
+                    inside += (0.5 - body.value(place.of(p)) / part).clamp(0.0, 1.0);
                 }
             }
         }
-        inside as f32 / (POINTS * POINTS * POINTS) as f32
+        (inside / (PARTS * PARTS * PARTS) as f64) as f32
     };
     let values = per_voxel(&grid, margin, share);
     Volume::from_vec(

@@ -59,6 +59,7 @@ fn share(partial: &[f32]) -> f64 {
 #[test]
 fn every_kind_has_the_volume_fraction_asked_for() {
     for kind in KINDS {
+        // Whole periods fill the box.
         let cell = if kind == BodyKind::Plates { 0.25 } else { 0.5 };
         let p = params(
             BodyParams {
@@ -127,8 +128,7 @@ fn partial_volumes_of_a_plane_are_its_share_of_each_voxel() {
         let inside = (0..2000).filter(|&n| made.value([x(n), 0.1, 0.2]) < 0.0);
         let exact = inside.count() as f64 / 2000.0;
         let found = f64::from(partial.values[[7, 3, i]]);
-        // Five points along x.
-        assert!((found - exact).abs() <= 0.11, "{i}: {found} {exact}");
+        assert!((found - exact).abs() < 1e-3, "{i}: {found} {exact}");
     }
     let grey = scan(&mut structure(&p).unwrap(), &p);
     for (grey, share) in grey.as_slice().iter().zip(partial.as_slice()) {
@@ -150,19 +150,18 @@ fn finer_voxels_show_the_same_body() {
         let fine = params(one, 0.25, 0.01);
         let fine = mask(&made(&fine), &fine);
         let partial = partial_volumes(&made(&coarse), &coarse, 0);
+        let mut sum = 0.0;
         for ((k, j, i), &share) in partial.values.indexed_iter() {
-            // The 5³ fine voxels' middles are the points that a coarse voxel's share is counted on.
             let window = ndarray::s![5 * k..5 * k + 5, 5 * j..5 * j + 5, 5 * i..5 * i + 5];
-            let count = fine
-                .values
-                .slice(window)
-                .iter()
-                .filter(|v| **v == 1)
-                .count();
-            let counted = count as f64 / 125.0;
-            // Rounding decides a point on a surface: one point at most.
-            assert!((f64::from(share) - counted).abs() < 0.009, "{kind:?}");
+            let fine = fine.values.slice(window);
+            let counted = fine.iter().filter(|v| **v == 1).count() as f64 / 125.0;
+            // A flat face may lie anywhere in the fine voxels that it cuts: half a layer of 25.
+            let off = f64::from(share) - counted;
+            assert!(off.abs() < 0.11, "{kind:?} {off}");
+            sum += off;
         }
+        let mean = sum / partial.grid.len() as f64;
+        assert!(mean.abs() < 2e-3, "{kind:?} {mean}");
     }
 }
 

@@ -43,14 +43,7 @@ impl Sweep {
         let mut model = model.clone();
         model.sweep = None;
         match self.parameter {
-            Parameter::Angle => {
-                if let Some(e) = &mut model.elasticity {
-                    e.angle_deg = value;
-                }
-                if let Some(c) = &mut model.conduction {
-                    c.angle_deg = value;
-                }
-            }
+            Parameter::Angle => model.problem.turn(value),
             Parameter::Mixity => {
                 for known in &mut model.known {
                     if let KnownField::CrackTip([k1, k2]) = &mut known.field {

@@ -9,10 +9,10 @@ use crate::scene::setting::Inputs;
 /// What is negative in some direction, a line each.
 pub fn negative(model: &Molecular, setup: &Setup, inputs: &Inputs) -> Result<Vec<String>> {
     let mut words = Vec::new();
-    if let Some(elasticity) = &model.elasticity {
+    if let Some(elasticity) = model.problem.elasticity() {
         elastic(elasticity, setup, inputs, &mut words)?;
     }
-    if let Some(conduction) = &model.conduction {
+    if let Some(conduction) = model.problem.conduction() {
         conducting(conduction, model, setup, &mut words)?;
     }
     Ok(words)

@@ -3,6 +3,7 @@
 use super::{Front, Ledger};
 use crate::error::Result;
 use crate::physics::continuum_molecular::body::Body;
+use crate::scene::continuum_molecular::Problem;
 use crate::scene::continuum_molecular::conduction::{drop, potential};
 use crate::scene::continuum_molecular::steady::{displacement, scalar, summary};
 use crate::scene::frame::{Frame, Observer, Summary};
@@ -64,8 +65,14 @@ impl<const D: usize> Front<'_, D> {
         let mut numbers = self.numbers();
         let mut fields = Vec::new();
         let due = accepted && (last || self.scene.output.due(self.recorded, self.lambda));
-        let conducting = self.conductor.as_ref().zip(self.model.conduction.as_ref());
-        if let Some((conductor, conduction)) = conducting.filter(|_| accepted) {
+        let probes = match &self.model.problem {
+            Problem::Fracture {
+                conduction: Some(steady),
+                ..
+            } => steady.probes,
+            _ => None,
+        };
+        if let Some(conductor) = self.conductor.as_ref().filter(|_| accepted) {
             let (values, unknowns) = potential(
                 self.scene,
                 self.model,
@@ -75,7 +82,7 @@ impl<const D: usize> Front<'_, D> {
                 self.lambda,
             )?;
             self.potential_unknowns = unknowns;
-            if let Some(probes) = conduction.probes {
+            if let Some(probes) = probes {
                 let before = self.potential_drop;
                 self.potential_drop = drop(self.setup, probes, &values);
                 if self.potential_drop.is_nan() && !before.is_nan() {
@@ -89,8 +96,7 @@ impl<const D: usize> Front<'_, D> {
                 fields.push(scalar("potential", values));
             }
         }
-        let probed = self.model.conduction.as_ref().and_then(|c| c.probes);
-        if probed.is_some() {
+        if probes.is_some() {
             numbers.push(("potential_drop".into(), self.potential_drop));
         }
         if due {

@@ -112,7 +112,7 @@ fn unlike_a_ramp(schedule: &Schedule, end: f64) -> Option<String> {
 
 /// Critical energy of each bond of the stencil.
 fn critical(model: &Molecular, params: &Fracture, setup: &Setup) -> Result<Vec<f64>> {
-    let angle_deg = model.elasticity.as_ref().map_or(0.0, |e| e.angle_deg);
+    let angle_deg = model.problem.elasticity().map_or(0.0, |e| e.angle_deg);
     let law = critical_energy(
         params.energy[0],
         params.energy[1],
@@ -135,8 +135,9 @@ fn sound(params: &Fracture, setup: &Setup, held: &[Option<f64>]) -> Result<Vec<b
     let mut sound: Vec<bool> = (0..n)
         .map(|p| (0..values).any(|d| held[p * values + d].is_some()))
         .collect();
-    for region in &params.unbreakable {
-        let chosen = region.select(&setup.points, n, "fracture.unbreakable")?;
+    for (k, region) in params.unbreakable.iter().enumerate() {
+        let key = format!("fracture.unbreakable[{k}]");
+        let chosen = region.select(&setup.points, n, &key)?;
         chosen.into_iter().for_each(|p| sound[p] = true);
     }
     if sound.iter().all(|s| *s) {
@@ -172,7 +173,7 @@ impl<'a, const D: usize> Front<'a, D> {
         let critical = critical(model, params, setup)?;
         let sound = sound(params, setup, &solid.held)?;
         let stop = stop(params, setup)?;
-        let conductor = match &model.conduction {
+        let conductor = match model.problem.conduction() {
             Some(conduction) => Some(setup.conductor(model, conduction)?.0),
             None => None,
         };

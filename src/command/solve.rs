@@ -207,7 +207,7 @@ fn solve_job(
     params: &SolveParams,
     session: &Session,
 ) -> Result<Row> {
-    let meter = Meter::start();
+    let meter = Meter::start(session.shares_process);
     let bar = session.bar(1000, &format!("{} {} mm", job.name(), blank.key.lp_mm));
     if job.is_stiffness(params) {
         let observe = |load: usize, step| show_load(&bar, load, step, params.tolerance);

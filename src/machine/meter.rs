@@ -3,21 +3,33 @@
 use std::time::Instant;
 
 /// Wall time and the process's memory peak since its start.
-pub struct Meter(Instant);
+pub struct Meter {
+    since: Instant,
+    shares_process: bool,
+}
 
 impl Meter {
-    pub fn start() -> Self {
-        // Linux forgets the peak on this word; elsewhere the peak is of the process's whole life.
-        let _ = std::fs::write("/proc/self/clear_refs", "5");
-        Meter(Instant::now())
+    /// `shares_process`: other scans are worked on at the same time.
+    pub fn start(shares_process: bool) -> Self {
+        if !shares_process {
+            // Linux forgets the peak on this word; elsewhere the peak is of the process's whole life.
+            let _ = std::fs::write("/proc/self/clear_refs", "5");
+        }
+        Meter {
+            since: Instant::now(),
+            shares_process,
+        }
     }
 
     pub fn wall_s(&self) -> f64 {
-        self.0.elapsed().as_secs_f64()
+        self.since.elapsed().as_secs_f64()
     }
 
-    /// The largest resident memory in MiB; None where the system does not tell.
+    /// The largest resident memory in MiB. None where the system does not tell, and where it is not this work's alone.
     pub fn peak_mib(&self) -> Option<f64> {
+        if self.shares_process {
+            return None;
+        }
         let bytes = from_status().or_else(peak_bytes);
         bytes.map(|b| b / (1024.0 * 1024.0))
     }

@@ -9,6 +9,7 @@ use crate::measure::spheres::Spread;
 use crate::recipe::Recipe;
 use crate::record::collect_rows::Solved;
 use crate::record::failures::Failure;
+use crate::record::results;
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
 use crate::report::html;
@@ -91,7 +92,7 @@ fn render(report: &Report, session: &Session) -> Result<Vec<(String, Vec<u8>)>> 
     let mut files = vec![
         text("report.md", markdown::render(report)),
         text("e_app.csv", table::to_csv(&report.lines)),
-        text("results.csv", table::to_csv(&report.rows)),
+        text(results::TABLE, table::to_csv(&report.rows)),
     ];
     let statistics = &report.statistics;
     if !statistics.boxes.is_empty() {

@@ -4,12 +4,11 @@ use crate::error::{Error, Result};
 use crate::io::table;
 use crate::machine::session::Session;
 use crate::record::failures::{Failure, failures_in};
+use crate::record::results::TABLE;
 use crate::record::specimen;
 use crate::result::row::Row;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-
-const TABLE: &str = "results.csv";
 
 /// Rows of all scans read so far, and the scans that have none.
 #[derive(Debug, Default)]

@@ -7,6 +7,7 @@ use crate::io::{atomic, table};
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::pipeline::apparent::SolveParams;
+use crate::record::specimen;
 use crate::result::extrapolate::with_extrapolated;
 use crate::result::ffb::with_ffb;
 use crate::result::row::Row;
@@ -16,6 +17,9 @@ use std::path::{Path, PathBuf};
 
 /// The rows of a scan, or of a run, for other programs.
 pub const TABLE: &str = "results.csv";
+
+/// The same with provenance.
+const RECORD: &str = "results.json";
 
 /// Where the rows of an earlier mask, or of a scan that failed since, are set aside; gone with the next solve.
 const OLD_TABLE: &str = "results.old.csv";
@@ -199,7 +203,7 @@ impl Results {
             rows: rows.iter().map(keyed).collect(),
         };
         let text = serde_json::to_string_pretty(&record).expect("plain data");
-        atomic::write(&self.dir.join("results.json"), text)?;
+        atomic::write(&self.dir.join(RECORD), text)?;
         write_table(&self.dir, &rows)
     }
 }
@@ -207,14 +211,14 @@ impl Results {
 impl Record {
     /// None where there is none, or an older program wrote another kind.
     fn read(dir: &Path) -> Option<Self> {
-        let text = std::fs::read(dir.join("results.json")).ok()?;
+        let text = std::fs::read(dir.join(RECORD)).ok()?;
         serde_json::from_slice(&text).ok()
     }
 }
 
 impl Provenance {
     fn now(dir: &Path) -> Result<Self> {
-        let mask = dir.join("mask.nii.gz");
+        let mask = dir.join(specimen::MASK);
         let bytes = std::fs::read(&mask).map_err(|e| {
             Error::file(
                 &mask,
@@ -222,7 +226,7 @@ impl Provenance {
                 "run `bonepd-ct segment` first",
             )
         })?;
-        let segment = std::fs::read(dir.join("segment.json")).unwrap_or_default();
+        let segment = std::fs::read(dir.join(specimen::RECORD)).unwrap_or_default();
         Ok(Provenance {
             program: env!("CARGO_PKG_NAME").to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -273,7 +277,7 @@ mod tests {
 
     fn folder() -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
-        std::fs::write(dir.path().join("mask.nii.gz"), "mask").unwrap();
+        std::fs::write(dir.path().join(specimen::MASK), "mask").unwrap();
         dir
     }
 
@@ -299,7 +303,7 @@ mod tests {
             ..params.clone()
         };
         assert_eq!(again.find(&blank(FIRM), &tighter), None);
-        let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
+        let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
         assert_eq!(table.len(), 3);
         assert_eq!(table[2].key.boundary, Some(BoundaryRule::Ffb));
 
@@ -309,7 +313,7 @@ mod tests {
                 .find(&blank(FIRM), &params),
             None
         );
-        std::fs::write(dir.path().join("mask.nii.gz"), "another").unwrap();
+        std::fs::write(dir.path().join(specimen::MASK), "another").unwrap();
         assert_eq!(
             Results::open(dir.path(), false)
                 .unwrap()
@@ -330,7 +334,7 @@ mod tests {
         results
             .keep(&blank(FIRM), &params, &solved(FIRM, 1.0))
             .unwrap();
-        let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
+        let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
         assert_eq!(table, [solved(FIRM, 1.0)]);
     }
 }

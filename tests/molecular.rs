@@ -9,7 +9,7 @@ mod history;
 mod limits;
 mod refusals;
 mod repeated_modes;
-mod stopped;
+mod resume;
 mod thermal_stress;
 mod turned;
 

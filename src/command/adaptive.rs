@@ -11,7 +11,7 @@ use crate::machine::session::Session;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::pipeline::apparent::{Method, SolveParams};
 use crate::pipeline::lattice::{Boundary, LatticeParams, Structure};
-use crate::record::error_target_note::Missed;
+use crate::record::error_target_note::ErrorTargetNote;
 use crate::record::results::Results;
 use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
 use crate::result::row::Row;
@@ -40,10 +40,10 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
     let specimen = load(dir)?;
     if !session.dry_run {
         // Of an earlier error asked for.
-        Results::open(dir, false)?.renote(Missed::take_back)?;
+        Results::open(dir, false)?.edit_rows(ErrorTargetNote::remove_note)?;
     }
     if session.force && !session.dry_run {
-        Results::begin_anew(dir)?;
+        Results::clear(dir)?;
     }
     // Dropped once: redone at every step, each would drop what the one before it solved.
     let session = &Session {
@@ -190,12 +190,12 @@ fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Res
     }
     if !met {
         let nearest = best(&rows);
-        let missed = Missed::of(
+        let note = ErrorTargetNote::of(
             nearest.map(|(row, _)| row).or(rows.last()),
             said(target, nearest),
         );
-        rows.iter_mut().for_each(|row| missed.note(row));
-        Results::open(dir, false)?.renote(|row| missed.note(row))?;
+        rows.iter_mut().for_each(|row| note.add_to(row));
+        Results::open(dir, false)?.edit_rows(|row| note.add_to(row))?;
     }
     Ok(Found { rows, met })
 }

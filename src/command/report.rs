@@ -7,7 +7,7 @@ use crate::machine::host;
 use crate::machine::session::Session;
 use crate::measure::spheres::Spread;
 use crate::recipe::Recipe;
-use crate::record::collect_rows::Solved;
+use crate::record::collect_rows::CollectedRows;
 use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::specimen;
@@ -26,11 +26,11 @@ pub const RECIPE: &str = "recipe.toml";
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Scans that
 /// were solved again in their own folders after the run are read from there. Returns the files written.
 pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<PathBuf>> {
-    let mut found = Solved::default();
+    let mut found = CollectedRows::default();
     for dir in dirs {
         found.add(dir, session)?;
     }
-    let Solved { rows, failures } = found;
+    let CollectedRows { rows, failures } = found;
     session.detail(format!("{} rows from {} folders", rows.len(), dirs.len()));
     let recipe = dirs
         .iter()

@@ -77,7 +77,12 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
     atomic::write(&out.join("scene.json"), json + "\n")?;
     writer.forget()?;
     session.say(in_words(&record));
-    if let Some(pace) = record.summary.pace.as_ref().filter(|p| p.changed()) {
+    if let Some(pace) = record
+        .summary
+        .step_statistics
+        .as_ref()
+        .filter(|p| p.changed())
+    {
         session.say(pace.to_string());
     }
     let outcome = if record.summary.converged {

@@ -65,7 +65,7 @@ pub fn solve(
         };
         let kept = results.find(&blank, params);
         let mut row = match kept
-            .filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params))
+            .filter(|_| !job.is_stiffness(params) || stiffness::is_current(dir, params))
             // Fields are written over by the next solve: whether those there are these is not known.
             .filter(|_| params.fields.is_empty())
         {
@@ -87,7 +87,7 @@ pub fn solve(
         };
         mark(&mut row, morphometry.as_ref());
         session.say(in_words(&row));
-        results.keep(&blank, params, &row)?;
+        results.store(&blank, params, &row)?;
         rows.push(row);
     }
     let all = with_extrapolated(&with_ffb(&rows));

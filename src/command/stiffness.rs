@@ -16,7 +16,7 @@ use std::path::Path;
 pub const RECORD: &str = "stiffness.json";
 
 /// Whether the matrix in `dir` follows from these settings and this mask.
-pub fn is_there(dir: &Path, params: &SolveParams) -> bool {
+pub fn is_current(dir: &Path, params: &SolveParams) -> bool {
     file::record(&dir.join(RECORD)).is_some_and(|record| {
         record.settings == *params
             && record.version == env!("CARGO_PKG_VERSION")

@@ -12,12 +12,12 @@ use std::time::SystemTime;
 
 /// Rows of all scans read so far, and the scans that have none.
 #[derive(Debug, Default)]
-pub struct Solved {
+pub struct CollectedRows {
     pub rows: Vec<Row>,
     pub failures: Vec<Failure>,
 }
 
-impl Solved {
+impl CollectedRows {
     /// Adds the rows of a solved scan's folder, or of the output of a run: of scans in it that were solved again since, the
     /// rows in their own folders, in place of those of the run.
     ///

@@ -106,7 +106,7 @@ impl Results {
         let mut rows = old
             .filter(|r| !redo && same(r))
             .map_or(Vec::new(), |r| r.rows);
-        // Means are made anew from what was solved.
+        // Means are computed again from what was solved.
         rows.retain(|row| row.key.is_some());
         Ok(Results {
             dir: dir.to_path_buf(),
@@ -126,8 +126,8 @@ impl Results {
             .map(|old| old.row.clone())
     }
 
-    /// Keeps a solved row, in place of an older one of the same settings, and writes both files.
-    pub fn keep(&mut self, blank: &Row, params: &SolveParams, row: &Row) -> Result<()> {
+    /// Stores a solved row, in place of an older one of the same settings, and writes both files.
+    pub fn store(&mut self, blank: &Row, params: &SolveParams, row: &Row) -> Result<()> {
         let mut new = KeyedRow {
             row: row.clone(),
             key: Some(key(blank, params)),
@@ -157,8 +157,8 @@ impl Results {
         if changed { self.write() } else { Ok(()) }
     }
 
-    /// Lets `change` look at, and change, the note of each solved row.
-    pub fn renote(&mut self, change: impl Fn(&mut Row)) -> Result<()> {
+    /// Lets `change` edit each solved row, and writes what has changed.
+    pub fn edit_rows(&mut self, change: impl Fn(&mut Row)) -> Result<()> {
         let before = self.record.rows.clone();
         self.record
             .rows
@@ -170,11 +170,11 @@ impl Results {
         }
     }
 
-    /// Drops what is kept in `dir`.
+    /// Removes all rows in `dir`.
     ///
     /// # Errors
     /// As [`Results::open`], and files that cannot be written.
-    pub fn begin_anew(dir: &Path) -> Result<()> {
+    pub fn clear(dir: &Path) -> Result<()> {
         Results::open(dir, true)?.write()
     }
 
@@ -287,10 +287,10 @@ mod tests {
         let params = SolveParams::default();
         let mut results = Results::open(dir.path(), false).unwrap();
         results
-            .keep(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0))
+            .store(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0))
             .unwrap();
         results
-            .keep(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1))
+            .store(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1))
             .unwrap();
 
         let again = Results::open(dir.path(), false).unwrap();
@@ -329,10 +329,10 @@ mod tests {
         let mut results = Results::open(dir.path(), false).unwrap();
         let mut stalled = solved(FIRM, 2.0);
         stalled.solved.as_mut().unwrap().converged = Some(false);
-        results.keep(&blank(FIRM), &params, &stalled).unwrap();
+        results.store(&blank(FIRM), &params, &stalled).unwrap();
         assert_eq!(results.find(&blank(FIRM), &params), None);
         results
-            .keep(&blank(FIRM), &params, &solved(FIRM, 1.0))
+            .store(&blank(FIRM), &params, &solved(FIRM, 1.0))
             .unwrap();
         let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
         assert_eq!(table, [solved(FIRM, 1.0)]);

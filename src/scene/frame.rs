@@ -2,8 +2,8 @@
 
 use crate::discretisation::plane::Points;
 use crate::error::{Error, Result};
-use crate::scene::pace::Pace;
 use crate::scene::state::State;
+use crate::scene::step_statistics::StepStatistics;
 use serde::{Deserialize, Serialize};
 
 /// What a scene writes, and when.
@@ -133,7 +133,8 @@ pub struct Summary {
     pub converged: bool,
     /// How the time step changed, where time is marched through.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub pace: Option<Pace>,
+    #[serde(rename = "pace")]
+    pub step_statistics: Option<StepStatistics>,
     /// Further numbers by name.
     pub numbers: Vec<(String, f64)>,
     /// Why it stopped early, where it did.

@@ -4,10 +4,10 @@
 pub mod conditions;
 pub mod continuum_molecular;
 pub mod frame;
-pub mod pace;
 pub mod remodelling;
 pub mod setting;
 pub mod state;
+pub mod step_statistics;
 
 use crate::discretisation::plane::Points;
 use crate::discretisation::plane::geometry::Geometry;

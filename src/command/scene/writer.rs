@@ -1,6 +1,6 @@
 //! Owns what a running scene leaves on disk: history, fields, maps, the animation, and the state to go on from.
 
-mod kept;
+mod saved_state;
 
 use super::differences::{self, Other, Scalars};
 use crate::discretisation::plane::Points;

@@ -32,7 +32,7 @@ impl Boundary {
     }
 }
 
-/// Cells with less bone than this carry no graded site (lem spec §5).
+/// Least bone fraction of a cell with a graded site.
 const LEAST_FRACTION: f64 = 0.02;
 
 /// Places for sites that 32-bit numbers can count.

@@ -1,7 +1,7 @@
 //! Owns conduction of heat and of charge: steady, transient, and through a body whose bonds break.
 
 use super::equilibrium::{Factorised, factorise, right_hand_side, solve};
-use super::path::stranded;
+use super::path::isolated;
 use super::setup::Setup;
 use super::steady::{loads, scalar, summary};
 use super::{Molecular, Steady, Transient};
@@ -281,11 +281,11 @@ pub fn potential(
 ) -> Result<(Vec<f64>, usize)> {
     let held = setup.held(scene, model, CONDUCTED, t, None)?;
     let force = loads(scene, model, setup, CONDUCTED, t)?;
-    let stranded = stranded(&setup.family, broken, &held, &force);
+    let isolated = isolated(&setup.family, broken, &held, &force);
     let mut factorised = factorise(body, &setup.points, &held, &[], &[])?;
     let mut q = right_hand_side(body, &factorised, &held, &force);
     factorised.llt.solve(&mut q);
     let x: Vec<[f64; 1]> = factorised.expand(&q, &held);
-    let value = |(x, stranded): (&[f64; 1], bool)| if stranded { f64::NAN } else { x[0] };
-    Ok((x.iter().zip(stranded).map(value).collect(), q.len()))
+    let value = |(x, isolated): (&[f64; 1], bool)| if isolated { f64::NAN } else { x[0] };
+    Ok((x.iter().zip(isolated).map(value).collect(), q.len()))
 }

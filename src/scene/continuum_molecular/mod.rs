@@ -322,7 +322,7 @@ fn solve(
             }
         }
     };
-    solved.map_err(|error| warnings::blame(error, &warnings))
+    solved.map_err(|error| warnings::with_warnings(error, &warnings))
 }
 
 fn elastic<const D: usize>(

@@ -194,7 +194,7 @@ pub fn summary(
         bonds: setup.bond_count(),
         steps,
         converged: true,
-        pace: None,
+        step_statistics: None,
         numbers,
         stopped: None,
     }

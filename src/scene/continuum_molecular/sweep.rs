@@ -1,6 +1,6 @@
 //! Owns a scene repeated over the values of one parameter.
 
-mod kept;
+mod saved_state;
 
 use super::{KnownField, Molecular};
 use crate::discretisation::plane::Points;
@@ -98,7 +98,7 @@ pub fn run(
     let mut warned = Vec::new();
     observer.start(&scene.points(inputs)?, sweep.values.len())?;
     let (mut total, mut finished) = match observer.resume()? {
-        Some(state) => kept::restore(&state)?,
+        Some(state) => saved_state::restore(&state)?,
         None => (
             Summary {
                 converged: true,
@@ -134,7 +134,7 @@ pub fn run(
             total.numbers.push((format!("{name}_at_{value}"), number));
         }
         finished += 1;
-        observer.keep(&|| kept::state(&total, finished))?;
+        observer.keep(&|| saved_state::state(&total, finished))?;
     }
     Ok(total)
 }

@@ -70,7 +70,7 @@ fn lowest(name: &str, k: &[f64], setup: &Setup, advice: &str) -> Option<String> 
 }
 
 /// The error of a factorisation, with `warnings` as what may be behind it.
-pub fn blame(error: Error, warnings: &[String]) -> Error {
+pub fn with_warnings(error: Error, warnings: &[String]) -> Error {
     match error {
         Error::Specimen { found, advice }
             if !warnings.is_empty() && found.contains("not positive definite") =>

@@ -1,6 +1,6 @@
 //! Owns what fracture reports: damage, loads, energies and their balance, the crack's measures.
 
-use super::{Front, Ledger};
+use super::{CrackGrowth, Ledger};
 use crate::error::Result;
 use crate::physics::continuum_molecular::body::Body;
 use crate::scene::continuum_molecular::Problem;
@@ -8,7 +8,7 @@ use crate::scene::continuum_molecular::conduction::{drop, potential};
 use crate::scene::continuum_molecular::steady::{displacement, scalar, summary};
 use crate::scene::frame::{Frame, Observer, Summary};
 
-impl<const D: usize> Front<'_, D> {
+impl<const D: usize> CrackGrowth<'_, D> {
     /// d = 1 - Σ over intact bonds/Σ over all (eq. 105).
     pub fn damage(&self) -> Vec<f64> {
         let at = |p: usize| {
@@ -23,8 +23,8 @@ impl<const D: usize> Front<'_, D> {
         (0..self.setup.points.len()).map(at).collect()
     }
 
-    pub fn sound_points(&self) -> usize {
-        self.sound.iter().filter(|s| **s).count()
+    pub fn unbreakable_points(&self) -> usize {
+        self.unbreakable.iter().filter(|s| **s).count()
     }
 
     pub fn numbers(&mut self) -> Vec<(String, f64)> {
@@ -100,7 +100,7 @@ impl<const D: usize> Front<'_, D> {
             numbers.push(("potential_drop".into(), self.potential_drop));
         }
         if due {
-            self.look();
+            self.update_whole_body();
             fields.insert(0, scalar("damage", self.damage()));
             fields.push(displacement(&self.x, self.lambda));
         }
@@ -134,7 +134,7 @@ impl<const D: usize> Front<'_, D> {
             ),
             ("work", self.model.thickness * self.ledger.work),
             ("worst_balance_error", self.worst_balance),
-            ("sound_points", self.sound_points() as f64),
+            ("sound_points", self.unbreakable_points() as f64),
             ("solves", self.solves as f64),
             ("solve_iterations", self.iterations as f64),
             ("windows", self.windows as f64),

@@ -23,7 +23,7 @@ const LP_OVER_THICKNESS: [f64; 3] = [1.0, 0.75, 0.5];
 /// Elements that a voxel-FE solve may have at most: some 8 GiB.
 const MOST_ELEMENTS: f64 = 2.5e7;
 
-/// What came of it.
+/// The outcome of `solve --error`.
 pub struct Found {
     /// The rows of all that was tried.
     pub rows: Vec<Row>,
@@ -167,7 +167,7 @@ fn percent(x: f64) -> String {
     format!("{:.2} %", 100.0 * x)
 }
 
-/// Says what came of it; where the target is missed, so do the rows, here and in the results.
+/// Reports the outcome. Where the target is missed, the rows get a note, here and in the results.
 fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Result<Found> {
     if session.dry_run || rows.iter().all(Row::is_disconnected) {
         return Ok(Found { rows, met: true });

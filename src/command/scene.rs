@@ -31,8 +31,8 @@ pub struct SceneRecord {
     pub last: serde_json::Map<String, serde_json::Value>,
 }
 
-/// Runs the scene file `path` and writes its results into `out`. A scene of remodelling or fracture, or a sweep, that was stopped goes on
-/// from the last state kept there, unless forced to start anew.
+/// Runs the scene file `path` and writes its results into `out`. A scene of remodelling or fracture, or a sweep, that was stopped resumes
+/// from the last state saved there, unless forced to start from the beginning.
 pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Option<SceneRecord>)> {
     let text = std::fs::read_to_string(path).map_err(|e| {
         Error::file(

@@ -25,7 +25,7 @@ impl Meter {
         self.since.elapsed().as_secs_f64()
     }
 
-    /// The largest resident memory in MiB. None where the system does not tell, and where it is not this work's alone.
+    /// The largest resident memory in MiB. None where the system does not report it, and where several scans share the process.
     pub fn peak_mib(&self) -> Option<f64> {
         if self.shares_process {
             return None;
@@ -35,7 +35,7 @@ impl Meter {
     }
 }
 
-/// Where Linux tells it: what `getrusage` counts there has that of the program which started this one in it.
+/// As Linux reports it. `getrusage` would include the memory of the program that started this one.
 fn from_status() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;

@@ -1,4 +1,4 @@
-//! Owns the note on rows that do not come to the stated error asked for.
+//! Owns the note on rows whose stated error is above the requested one.
 
 use crate::result::row::Row;
 use crate::result::settings::{BoundaryRule, Settings};
@@ -6,14 +6,14 @@ use crate::result::settings::{BoundaryRule, Settings};
 /// How the note begins.
 const PREFIX: &str = "the error asked for, ";
 
-/// What is to be said, and of which solve.
+/// The note, and the solve it is about.
 pub struct ErrorTargetNote {
     nearest: Option<Settings>,
     words: String,
 }
 
 impl ErrorTargetNote {
-    /// `nearest` is the row that comes nearest to what was asked for; `words` go on from "the error asked for, ".
+    /// `nearest` is the row with the smallest stated error; `words` follow "the error asked for, ".
     pub fn of(nearest: Option<&Row>, words: String) -> ErrorTargetNote {
         ErrorTargetNote {
             nearest: nearest.map(|row| row.key.clone()),

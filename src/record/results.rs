@@ -239,7 +239,7 @@ impl Provenance {
     }
 }
 
-/// What a row follows from, beside the mask and the version: its lattice and all settings, also those without a column.
+/// Key of what a row follows from, apart from the mask and the version: its lattice and all settings, also those without a column.
 fn key(blank: &Row, params: &SolveParams) -> String {
     let all = serde_json::json!([blank, params]);
     blake3::hash(all.to_string().as_bytes()).to_hex()[..32].to_owned()

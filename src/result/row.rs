@@ -49,7 +49,7 @@ pub struct FailureLoad {
     pub factor: f64,
 }
 
-/// What is known of a row or of its specimen beside the solve.
+/// What is known of a row or of its specimen apart from the solve.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Marks {
     /// What a reader must know of this row (no path between the faces, not converged, ...).

@@ -1,4 +1,4 @@
-//! Owns what a running scene tells the outside: states as they are accepted, and a closing summary.
+//! Owns what a running scene reports: states as they are accepted, and a closing summary.
 
 use crate::discretisation::plane::Points;
 use crate::error::{Error, Result};
@@ -101,7 +101,7 @@ pub trait Observer {
     /// Before the first state. `steps` is the number of steps foreseen.
     fn start(&mut self, points: &Points, steps: usize) -> Result<()>;
     fn frame(&mut self, frame: &Frame) -> Result<()>;
-    /// A frame that was told of before, of the same time, now with its fields.
+    /// A frame that was reported before, of the same time, now with its fields.
     fn again(&mut self, frame: &Frame) -> Result<()> {
         self.frame(frame)
     }

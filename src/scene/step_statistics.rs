@@ -41,7 +41,7 @@ impl StepStatistics {
         self.last = dt;
     }
 
-    /// Whether there is anything to tell.
+    /// Whether the step ever changed.
     pub fn changed(&self) -> bool {
         self.halvings > 0 || self.longest_step > self.shortest_step * (1.0 + SAME)
     }

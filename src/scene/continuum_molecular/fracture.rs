@@ -99,7 +99,7 @@ pub fn run<const D: usize>(
     match observer.resume()? {
         Some(state) => {
             growth.restore(&state)?;
-            observer.say(&format!("goes on at a load of {:.6}", growth.lambda));
+            observer.say(&format!("resumed at a load of {:.6}", growth.lambda));
         }
         None => growth.record(observer, true, false)?,
     }

@@ -59,7 +59,7 @@ impl Sweep {
 }
 
 /// Passes nothing on but words and, at the end, the last fields. What is kept of a stopped sweep is its finished values:
-/// the one under way starts anew.
+/// the one under way starts again.
 struct Quiet<'a> {
     inner: &'a mut dyn Observer,
     last: Frame,
@@ -109,7 +109,7 @@ pub fn run(
     };
     if finished > 0 {
         observer.say(&format!(
-            "goes on after {finished} of {} values",
+            "resumed after {finished} of {} values",
             sweep.values.len()
         ));
     }

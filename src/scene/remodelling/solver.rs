@@ -184,7 +184,10 @@ impl Equilibrium {
         let kind = state.array("factor.kind", 2)?;
         let made = reuse.chord.remake(step, q, [kind[0], kind[1]]);
         made.map_err(|why| {
-            Error::specimen(format!("its kept state: {why}"), "start anew with --force")
+            Error::specimen(
+                format!("its saved state: {why}"),
+                "start from the beginning with --force",
+            )
         })
     }
 }

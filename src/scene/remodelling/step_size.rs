@@ -1,4 +1,4 @@
-//! Owns the lengths of time steps: all alike, or as long as the error they add to the densities allows.
+//! Owns the lengths of time steps: all equal, or as long as the error they add to the densities allows.
 
 use crate::error::Result;
 use crate::scene::conditions::Time;

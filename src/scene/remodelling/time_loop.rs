@@ -170,7 +170,7 @@ pub fn run_time_loop(
             progress.restore(&clock, &state)?;
             step_size.restore(&state)?;
             model.restore(&state)?;
-            observer.say(&format!("goes on at t = {:.6}", clock.at(progress.ticks)));
+            observer.say(&format!("resumed at t = {:.6}", clock.at(progress.ticks)));
         }
         None => observer.frame(&model.frame(0.0, true))?,
     }

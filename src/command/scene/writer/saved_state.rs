@@ -1,4 +1,4 @@
-//! Owns the state that a stopped scene goes on from, beside its results.
+//! Owns the state that a stopped scene resumes from, next to its results.
 
 use super::Writer;
 use crate::error::{Error, Result};
@@ -72,15 +72,17 @@ impl Writer<'_> {
         let state = match state::read(&self.state_path(), &self.fingerprint) {
             StateFile::Nothing => return Ok(None),
             StateFile::Unusable(why) => {
-                self.session
-                    .say(format!("{STATE} is not used: {why}; starting anew"));
+                self.session.say(format!(
+                    "{STATE} is not used: {why}; starting from the beginning"
+                ));
                 return Ok(None);
             }
             StateFile::State(state) => state,
         };
         if let Err(e) = self.recall(&state) {
-            self.session
-                .say(format!("{STATE} is not used: {e}\nstarting anew"));
+            self.session.say(format!(
+                "{STATE} is not used: {e}\nstarting from the beginning"
+            ));
             self.history.clear();
             self.maps.clear();
             return Ok(None);

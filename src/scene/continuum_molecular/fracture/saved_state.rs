@@ -1,5 +1,5 @@
-//! Owns the state that stopped fracture goes on from: bonds in the order in which they broke, the window they broke in, and
-//! the sums. Factors are computed anew, so that what follows is bit by bit what would have followed.
+//! Owns the state that stopped fracture resumes from: bonds in the order in which they broke, the window they broke in, and
+//! the sums. Factors are computed again, so that the run continues bit for bit.
 
 use super::{CrackGrowth, Ledger};
 use crate::error::Result;

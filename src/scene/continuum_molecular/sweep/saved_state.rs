@@ -1,4 +1,4 @@
-//! Owns the state that a stopped sweep goes on from: how many values are finished, and the summary so far.
+//! Owns the state that a stopped sweep resumes from: how many values are finished, and the summary so far.
 
 use crate::error::Result;
 use crate::scene::frame::Summary;

@@ -156,7 +156,7 @@ fn read_inp(text: &str) -> Vec<(f64, f64, usize)> {
 #[test]
 fn every_element_of_an_inp_has_the_material_of_its_voxel() {
     let n = [6, 5, 8];
-    let mut specimen = crate::made::specimen(n, [0.02; 3], |_| true);
+    let mut specimen = crate::specimens::specimen(n, [0.02; 3], |_| true);
     let grid = specimen.bone.grid;
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("model.inp");

@@ -10,7 +10,7 @@ use bonepd_ct::volume::{Specimen, Volume};
 
 const LP_MM: f64 = 0.1;
 const YOUNG_MPA: f64 = 1000.0;
-/// The list of Poisson's ratios: every structure must match the solid at each.
+/// Every structure must match the solid at each of these Poisson's ratios.
 const POISSONS: [f64; 5] = [0.0, 0.1, 0.25, 0.3, 0.45];
 
 /// A block of 8³ lattice parameters, all bone.
@@ -84,7 +84,7 @@ fn a_fully_bonded_site_has_the_solids_stiffness() {
                 let c44 = twice_density(shear);
                 let solid = [lambda + 2.0 * mu, lambda, mu];
                 for (found, exact) in [c11, c12, c44].into_iter().zip(solid) {
-                    // The bound, relative to C11 (C12 is zero at ν = 0). Measured: 2e-15.
+                    // Relative to C11 (C12 is zero at ν = 0). Measured: 2e-15.
                     let error = (found - exact).abs() / solid[0];
                     assert!(
                         error < 1e-12,

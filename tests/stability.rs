@@ -1,8 +1,8 @@
 //! Hard cases: what each came to, how far its stated error was off, and how many mechanisms it has.
 //! `cargo test --release stability_cases -- --nocapture` prints the table.
 
-use crate::made::specimen;
-use crate::stopped::textbook;
+use crate::specimens::specimen;
+use crate::stopping::textbook;
 use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::Operator;
@@ -65,7 +65,7 @@ fn poisson(poisson: f64) -> SolveParams {
     }
 }
 
-/// The list. Each is small enough that a run to 1e-12 and a factorisation take moments.
+/// Hard cases. Each is small enough that a run to 1e-12 and a factorisation take moments.
 fn cases() -> Vec<Case> {
     use Boundary::{Connected, Firm, Floppy};
     use Model::{Lattice, Voxels};

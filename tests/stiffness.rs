@@ -1,7 +1,7 @@
 //! The apparent stiffness matrix: closed forms, symmetries, what its stated error is worth, and its file.
 
 use crate::cli::run;
-use crate::made::specimen;
+use crate::specimens::specimen;
 use bonepd_ct::error::Result;
 use bonepd_ct::grid::Axis;
 use bonepd_ct::measure::stiffness::{Six, compliance, orthotropic, seen_from};
@@ -181,7 +181,7 @@ fn the_matrix_is_symmetric_and_positive_and_kinematic_bounds_mixed() {
     }
 }
 
-/// The bound asked for: the true error is at most three times the stated one.
+/// The true error is at most three times the stated one.
 #[test]
 fn the_stated_errors_hold() {
     let s = specimen([20; 3], [0.02; 3], irregular);

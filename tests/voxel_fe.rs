@@ -1,6 +1,6 @@
 //! Voxel finite elements against closed forms, and the multigrid that solves them.
 
-use crate::made::specimen;
+use crate::specimens::specimen;
 use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::solved::Solved;
 use bonepd_ct::pipeline::apparent::{Ends, Load, SolveParams};

@@ -79,7 +79,7 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
     Ok(jobs)
 }
 
-/// A setting that cannot be used, told with the line of the manifest that gives it.
+/// A setting that cannot be used, with the line of the manifest that gives it.
 fn of_line(path: &Path, line: u64, e: Error) -> Error {
     match e {
         Error::Setting { key, found, advice } => {

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::machine::session::Session;
 use crate::pipeline::apparent::{Method, SolveParams};
 use crate::pipeline::lattice::{BoundaryWord, LatticeParams, Structure};
-use crate::record::error_target_note::Missed;
+use crate::record::error_target_note::ErrorTargetNote;
 use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
 use crate::result::row::Row;
 use std::path::Path;
@@ -20,7 +20,7 @@ const LP_OVER_THICKNESS: [f64; 3] = [1.0, 0.75, 0.5];
 /// Elements that a voxel-FE solve may have at most: some 8 GiB.
 const MOST_ELEMENTS: f64 = 2.5e7;
 
-/// What came of it.
+/// The outcome of `solve --error`.
 pub struct Found {
     /// The rows of all that was tried.
     pub rows: Vec<Row>,
@@ -37,7 +37,7 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
     let mut scan = OpenScan::open(dir, params, false, session)?;
     if !session.dry_run {
         // Notes of an earlier target.
-        scan.results().renote(Missed::take_back)?;
+        scan.results().edit_rows(ErrorTargetNote::remove_note)?;
         if session.force {
             scan.results().clear()?;
         }
@@ -151,7 +151,7 @@ fn percent(x: f64) -> String {
     format!("{:.2} %", 100.0 * x)
 }
 
-/// Says what came of it; where the target is missed, so do the rows, here and in the results.
+/// Reports the outcome. Where the target is missed, the rows get a note, here and in the results.
 fn finish(
     scan: &mut OpenScan,
     mut rows: Vec<Row>,
@@ -179,12 +179,12 @@ fn finish(
     }
     if !met {
         let nearest = best(&rows);
-        let missed = Missed::of(
+        let note = ErrorTargetNote::of(
             nearest.map(|(row, _)| row).or(rows.last()),
             said(target, nearest),
         );
-        rows.iter_mut().for_each(|row| missed.note(row));
-        scan.results().renote(|row| missed.note(row))?;
+        rows.iter_mut().for_each(|row| note.add_to(row));
+        scan.results().edit_rows(|row| note.add_to(row))?;
     }
     Ok(Found { rows, met })
 }

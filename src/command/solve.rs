@@ -122,7 +122,7 @@ impl OpenScan {
             };
             mark(&mut row, self.morphometry.as_ref());
             session.say(in_words(&row));
-            self.results.keep(blank, params, &row)?;
+            self.results.store(blank, params, &row)?;
             rows.push(row);
         }
         let all = with_extrapolated(&with_ffb(&rows));
@@ -160,7 +160,7 @@ impl OpenScan {
         // Fields are written over by the next solve: whether those there are these is not known.
         let kept = params.fields.is_empty()
             && (params.load != Load::Stiffness
-                || stiffness::is_there(&self.dir, params, self.results.mask_blake3()));
+                || stiffness::is_current(&self.dir, params, self.results.mask_blake3()));
         if let Some(row) = self.results.find(blank, params).filter(|_| kept) {
             return Ok(Some(row));
         }
@@ -188,7 +188,7 @@ impl OpenScan {
             specimen: &self.specimen,
             tissue: &self.tissue,
         };
-        let meter = Meter::start();
+        let meter = Meter::start(session.shares_process);
         let bar = session.bar(
             1000,
             &format!("{} {} mm", name(&blank.key), blank.key.lp_mm),

@@ -14,7 +14,7 @@ use std::path::Path;
 pub const RECORD: &str = "stiffness.json";
 
 /// Whether the matrix in `dir` follows from these settings and the mask of this hash.
-pub fn is_there(dir: &Path, params: &SolveParams, mask_blake3: &str) -> bool {
+pub fn is_current(dir: &Path, params: &SolveParams, mask_blake3: &str) -> bool {
     file::record(&dir.join(RECORD)).is_some_and(|record| {
         record.settings == *params
             && record.version == env!("CARGO_PKG_VERSION")

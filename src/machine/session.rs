@@ -19,6 +19,8 @@ pub struct Session {
     pub force: bool,
     /// The scan of a run that this session is about: warnings name it.
     pub scan: Option<String>,
+    /// Other scans are worked on at the same time: the process's memory is not this one's.
+    pub shares_process: bool,
     pub output: Output,
 }
 

@@ -3,10 +3,10 @@
 pub mod apparent;
 pub mod distance;
 pub mod fabric;
-#[cfg(test)]
-mod made;
 pub mod morphometry;
 pub mod pistoia;
+#[cfg(test)]
+mod specimens;
 pub mod spheres;
 pub mod stiffness;
 pub mod thickness;

@@ -33,7 +33,7 @@ pub struct Input {
     /// Of the mask that is the volume of interest, where one is.
     pub voi_blake3: Option<String>,
     pub format: String,
-    /// Unit of the grey values where the file tells.
+    /// Unit of the grey values where the file states it.
     pub unit: Option<String>,
     pub notes: Vec<String>,
 }

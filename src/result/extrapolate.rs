@@ -1,7 +1,7 @@
 //! Owns what several resolutions of one specimen say together: the modulus in the limit and how far off it may be.
 //!
-//! Both models come nearer to the limit as lattice parameter or element shrink, but not alike. The error of a graded
-//! lattice in bending, smeared over a cell, falls with the square of LP, beside scatter of where cells fall. That of voxel
+//! Both models converge as lattice parameter or element size shrink, at different orders. The error of a graded
+//! lattice in bending, smeared over a cell, falls with the square of LP, plus scatter from the position of the cells. That of voxel
 //! FE falls with the power 1.3 (edges of voxels; 1.17 to 1.31 fitted on phantoms, `reports/speed-vs-error.md`), from above.
 
 use crate::result::row::{Marks, Row, Solution};

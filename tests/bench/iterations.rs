@@ -34,12 +34,10 @@ fn main() {
             report(&name, &thin(seed), Ends::Bonded);
         }
     }
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let stack = root.join("../shared/data/lhdl_3155_D_4_bc");
     if wanted("stack") {
-        match stack.exists() {
-            true => report("stack", &real(&stack), Ends::Free),
-            false => println!("stack: skipped: {} is not there", stack.display()),
+        match std::env::var_os("BONEPD_STACK") {
+            Some(stack) => report("stack", &real(Path::new(&stack)), Ends::Free),
+            None => println!("stack: skipped: BONEPD_STACK does not name the folder of its slices"),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Owns the lengths of time steps: all alike, or as long as the error they add to the densities allows.
+//! Owns the lengths of time steps: all equal, or as long as the error they add to the densities allows.
 
 use crate::error::Result;
 use crate::scene::conditions::Time;
@@ -11,7 +11,7 @@ const GROWTH: f64 = 2.0;
 const SAFETY: f64 = 0.9;
 
 /// Chooses each step as a whole number of the scene's shortest.
-pub struct Stride {
+pub struct StepSize {
     step: f64,
     tolerance: Option<f64>,
     /// Times at which supports or loads jump or bend, ascending.
@@ -27,10 +27,10 @@ struct Before {
     rate: Vec<f64>,
 }
 
-impl Stride {
+impl StepSize {
     pub fn new(time: &Time, mut corners: Vec<f64>) -> Self {
         corners.sort_unstable_by(f64::total_cmp);
-        Stride {
+        StepSize {
             step: time.step,
             tolerance: time.tolerance,
             corners,
@@ -133,14 +133,14 @@ mod tests {
             times: vec![7.0],
             ..Output::default()
         };
-        let mut stride = Stride::new(&time, vec![0.5]);
+        let mut step_size = StepSize::new(&time, vec![0.5]);
         let (mut at, mut rho, mut ends, mut lengths) = (0u64, 1.0, Vec::new(), Vec::new());
         while at < 4000 {
-            let n = stride.next(at, 4000, &output);
+            let n = step_size.next(at, 4000, &output);
             let dt = n as f64 * time.step;
             let next = rho / (1.0 + dt);
             at += n;
-            stride.accepted(at as f64 * time.step, dt, &[rho], &[next]);
+            step_size.accepted(at as f64 * time.step, dt, &[rho], &[next]);
             rho = next;
             ends.push(at);
             lengths.push(n);

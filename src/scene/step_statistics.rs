@@ -1,13 +1,13 @@
-//! Owns the account of a march's time steps: how often they were halved and grown, and between which lengths.
+//! Owns the statistics of time steps: how often they were halved and grown, and between which lengths.
 
 use crate::error::Result;
 use crate::scene::state::State;
 use serde::Serialize;
 use std::fmt;
 
-/// How the step of a march changed.
+/// How the time step changed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Pace {
+pub struct StepStatistics {
     /// Steps that did not converge and were tried again, half as long.
     pub halvings: usize,
     /// Accepted steps longer than the one before.
@@ -22,7 +22,7 @@ pub struct Pace {
 /// Lengths that differ by less are the same: planned steps are whole multiples of rounded ones.
 const SAME: f64 = 1e-9;
 
-impl Pace {
+impl StepStatistics {
     pub fn halved(&mut self) {
         self.halvings += 1;
     }
@@ -41,7 +41,7 @@ impl Pace {
         self.last = dt;
     }
 
-    /// Whether there is anything to tell.
+    /// Whether the step ever changed.
     pub fn changed(&self) -> bool {
         self.halvings > 0 || self.longest_step > self.shortest_step * (1.0 + SAME)
     }
@@ -59,7 +59,7 @@ impl Pace {
 
     pub fn restore(state: &State) -> Result<Self> {
         let counts = state.array("pace", 5)?;
-        Ok(Pace {
+        Ok(StepStatistics {
             halvings: counts[0] as usize,
             growths: counts[1] as usize,
             shortest_step: counts[2],
@@ -69,7 +69,7 @@ impl Pace {
     }
 }
 
-impl fmt::Display for Pace {
+impl fmt::Display for StepStatistics {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         if self.longest_step == 0.0 {
             return write!(
@@ -92,22 +92,26 @@ mod tests {
 
     #[test]
     fn counts_survive_a_stop() {
-        let mut pace = Pace::default();
-        assert!(!pace.changed());
-        [0.2, 0.2 + 1e-15].iter().for_each(|dt| pace.accepted(*dt));
-        assert!(!pace.changed() && pace.growths == 0);
-        let mut stuck = Pace::default();
+        let mut statistics = StepStatistics::default();
+        assert!(!statistics.changed());
+        [0.2, 0.2 + 1e-15]
+            .iter()
+            .for_each(|dt| statistics.accepted(*dt));
+        assert!(!statistics.changed() && statistics.growths == 0);
+        let mut stuck = StepStatistics::default();
         stuck.halved();
         assert_eq!(
             stuck.to_string(),
             "time step halved 1 times, none was taken"
         );
-        pace.halved();
+        statistics.halved();
         let mut state = State::default();
-        pace.save(&mut state);
-        let mut pace = Pace::restore(&state).unwrap();
-        [0.1, 0.2, 0.4].iter().for_each(|dt| pace.accepted(*dt));
-        let words = pace.to_string();
+        statistics.save(&mut state);
+        let mut statistics = StepStatistics::restore(&state).unwrap();
+        [0.1, 0.2, 0.4]
+            .iter()
+            .for_each(|dt| statistics.accepted(*dt));
+        let words = statistics.to_string();
         assert_eq!(
             words,
             "time step halved 1 times, grown 2 times; steps taken from 1.000e-1 to 4.000e-1"

@@ -1,4 +1,4 @@
-//! Owns the state that a stopped sweep goes on from: how many values are finished, and the summary so far.
+//! Owns the state that a stopped sweep resumes from: how many values are finished, and the summary so far.
 
 use crate::error::Result;
 use crate::scene::frame::Summary;
@@ -47,7 +47,7 @@ pub fn restore(state: &State) -> Result<(Summary, usize)> {
         bonds: sums[5] as usize,
         numbers: state.arrays().filter_map(number).collect(),
         stopped: stopped.next().map(str::to_owned),
-        pace: None,
+        step_statistics: None,
     };
     Ok((total, sums[0] as usize))
 }

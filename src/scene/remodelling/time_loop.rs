@@ -1,11 +1,11 @@
-//! Owns the march through time: steps that halve when they do not converge, and grow back afterwards.
+//! Owns the loop over time steps: steps that halve when they do not converge, and grow back afterwards.
 
 use crate::error::Result;
 use crate::scene::conditions::Time;
 use crate::scene::frame::{Frame, Observer, Output, Summary};
-use crate::scene::pace::Pace;
-use crate::scene::remodelling::stride::Stride;
+use crate::scene::remodelling::step_size::StepSize;
 use crate::scene::state::State;
+use crate::scene::step_statistics::StepStatistics;
 use crate::solver::newton::NotConverged;
 
 /// A model that can be taken from one time to a later one.
@@ -79,7 +79,7 @@ pub fn rounded(t: f64) -> f64 {
     format!("{t:.11e}").parse().unwrap_or(t)
 }
 
-/// How far a march has come, and what it took.
+/// How far a run has come, and what it took.
 #[derive(Default)]
 struct Progress {
     ticks: u64,
@@ -90,13 +90,13 @@ struct Progress {
     iterations: usize,
     factorisations: usize,
     worst: f64,
-    pace: Pace,
+    step_statistics: StepStatistics,
 }
 
 impl Progress {
     fn accepted(&mut self, clock: &Clock, length: u64, advance: &Advance) {
         self.ticks += length;
-        self.pace.accepted(clock.span(length));
+        self.step_statistics.accepted(clock.span(length));
         self.streak += 1;
         self.steps += 1;
         self.iterations += advance.iterations;
@@ -116,7 +116,7 @@ impl Progress {
             self.worst,
         ];
         state.put("march", counts);
-        self.pace.save(state);
+        self.step_statistics.save(state);
     }
 
     fn restore(&mut self, clock: &Clock, state: &State) -> Result<()> {
@@ -129,7 +129,7 @@ impl Progress {
             iterations: counts[5] as usize,
             factorisations: counts[6] as usize,
             worst: counts[7],
-            pace: Pace::restore(state)?,
+            step_statistics: StepStatistics::restore(state)?,
         };
         Ok(())
     }
@@ -137,7 +137,7 @@ impl Progress {
     fn report(&self, summary: &mut Summary) {
         summary.steps = self.steps;
         summary.converged = summary.stopped.is_none();
-        summary.pace = Some(self.pace.clone());
+        summary.step_statistics = Some(self.step_statistics.clone());
         let total = |name: &str, value: f64| (name.to_owned(), value);
         summary.numbers.extend([
             total("iterations", self.iterations as f64),
@@ -148,14 +148,14 @@ impl Progress {
 }
 
 /// # Errors
-/// Times that no march can take.
+/// Times that no run can take.
 pub fn check(time: &Time) -> Result<()> {
     Clock::new(time).map(|_| ())
 }
 
 /// Marches to `time.end`, from rest or from the state the observer kept. A step that fails at its smallest stops the
-/// march: the last good state is reported with its fields and the summary says why.
-pub fn march(
+/// run: the last good state is reported with its fields and the summary says why.
+pub fn run_time_loop(
     model: &mut impl Marching,
     time: &Time,
     output: &Output,
@@ -163,14 +163,14 @@ pub fn march(
     summary: &mut Summary,
 ) -> Result<()> {
     let clock = Clock::new(time)?;
-    let mut stride = Stride::new(time, model.corners());
+    let mut step_size = StepSize::new(time, model.corners());
     let mut progress = Progress::default();
     match observer.resume()? {
         Some(state) => {
             progress.restore(&clock, &state)?;
-            stride.restore(&state)?;
+            step_size.restore(&state)?;
             model.restore(&state)?;
-            observer.say(&format!("goes on at t = {:.6}", clock.at(progress.ticks)));
+            observer.say(&format!("resumed at t = {:.6}", clock.at(progress.ticks)));
         }
         None => observer.frame(&model.frame(0.0, true))?,
     }
@@ -180,7 +180,7 @@ pub fn march(
         let ticks = progress.ticks;
         let length = match progress.level {
             0 if ticks % clock.whole == 0 => {
-                stride.next(ticks / clock.whole, clock.steps, output) * clock.whole
+                step_size.next(ticks / clock.whole, clock.steps, output) * clock.whole
             }
             level => clock.whole >> level,
         };
@@ -188,9 +188,9 @@ pub fn march(
         match model.advance(before, now) {
             Ok(advance) => {
                 progress.accepted(&clock, length, &advance);
-                if stride.is_adaptive() {
+                if step_size.is_adaptive() {
                     let old = std::mem::replace(&mut densities, model.densities());
-                    stride.accepted(now, now - before, &old, &densities);
+                    step_size.accepted(now, now - before, &old, &densities);
                 }
                 let due = progress.ticks == end || output.due(before, now);
                 observer.frame(&model.frame(now, due))?;
@@ -198,20 +198,20 @@ pub fn march(
                 observer.keep(&|| {
                     let mut state = State::default();
                     progress.save(&clock, &mut state);
-                    stride.save(&mut state);
+                    step_size.save(&mut state);
                     model.save(&mut state);
                     state
                 })?;
             }
             Err(why) if length > clock.whole => {
-                stride.failed();
-                progress.pace.halved();
+                step_size.failed();
+                progress.step_statistics.halved();
                 observer.say(&format!("t = {now:.6}: {why}; a shorter step is tried"));
             }
             Err(why) if progress.level < clock.finest => {
                 progress.level += 1;
                 progress.streak = 0;
-                progress.pace.halved();
+                progress.step_statistics.halved();
                 let length = clock.length(progress.level);
                 observer.say(&format!("t = {now:.6}: {why}; step halved to {length:.3e}"));
             }

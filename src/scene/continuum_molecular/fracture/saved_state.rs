@@ -1,12 +1,12 @@
-//! Owns the state that stopped fracture goes on from: bonds in the order in which they broke, the window they broke in, and
-//! the sums. Factors are computed anew, so that what follows is bit by bit what would have followed.
+//! Owns the state that stopped fracture resumes from: bonds in the order in which they broke, the window they broke in, and
+//! the sums. Factors are computed again, so that the run continues bit for bit.
 
-use super::{Front, Ledger};
+use super::{CrackGrowth, Ledger};
 use crate::error::Result;
 use crate::scene::continuum_molecular::window::{Window, WindowBond};
 use crate::scene::state::State;
 
-impl<const D: usize> Front<'_, D> {
+impl<const D: usize> CrackGrowth<'_, D> {
     /// The state between two events of a load step.
     pub fn state(&self) -> State {
         let mut state = State::default();
@@ -29,7 +29,7 @@ impl<const D: usize> Front<'_, D> {
             self.iterations as f64,
             self.windows as f64,
             self.potential_drop,
-            self.far,
+            self.max_ratio_outside,
             f64::from(u8::from(self.stale)),
             self.before_window as f64,
             self.unsettled as f64,
@@ -68,7 +68,7 @@ impl<const D: usize> Front<'_, D> {
         (self.peak, self.worst_balance) = (s[7], s[8]);
         (self.solves, self.iterations, self.windows) =
             (s[9] as usize, s[10] as usize, s[11] as usize);
-        (self.potential_drop, self.far, self.stale) = (s[12], s[13], s[14] != 0.0);
+        (self.potential_drop, self.max_ratio_outside, self.stale) = (s[12], s[13], s[14] != 0.0);
         self.unsettled = s[16] as usize;
         Ok(())
     }

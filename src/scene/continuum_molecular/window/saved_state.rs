@@ -1,4 +1,4 @@
-//! Owns a window's part in the state that stopped fracture goes on from.
+//! Owns a window's part in the state that stopped fracture resumes from.
 
 use super::{Window, WindowBond};
 use crate::error::Result;

@@ -1,11 +1,11 @@
-//! Owns the state that a stopped scene goes on from, beside its results.
+//! Owns the state that a stopped scene resumes from, next to its results.
 
 use super::Writer;
 use crate::error::{Error, Result};
 use crate::export::points as files;
 use crate::record::history;
 use crate::record::state;
-use crate::record::state::Kept;
+use crate::record::state::StateFile;
 use crate::scene::state::State;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -24,7 +24,7 @@ impl Writer<'_> {
     /// Whether this very scene was stopped here before.
     pub fn goes_on(&self) -> bool {
         let kept = || state::read(&self.state_path(), &self.fingerprint);
-        !self.session.force && matches!(kept(), Kept::State(_))
+        !self.session.force && matches!(kept(), StateFile::State(_))
     }
 
     /// A finished scene has nothing to go on from.
@@ -70,17 +70,19 @@ impl Writer<'_> {
             return Ok(None);
         }
         let state = match state::read(&self.state_path(), &self.fingerprint) {
-            Kept::Nothing => return Ok(None),
-            Kept::Unusable(why) => {
-                self.session
-                    .say(format!("{STATE} is not used: {why}; starting anew"));
+            StateFile::Nothing => return Ok(None),
+            StateFile::Unusable(why) => {
+                self.session.say(format!(
+                    "{STATE} is not used: {why}; starting from the beginning"
+                ));
                 return Ok(None);
             }
-            Kept::State(state) => state,
+            StateFile::State(state) => state,
         };
         if let Err(e) = self.recall(&state) {
-            self.session
-                .say(format!("{STATE} is not used: {e}\nstarting anew"));
+            self.session.say(format!(
+                "{STATE} is not used: {e}\nstarting from the beginning"
+            ));
             self.history.clear();
             self.maps.clear();
             return Ok(None);

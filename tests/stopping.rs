@@ -1,6 +1,6 @@
 //! The real stack's converged modulus by voxel elements, and a textbook solver to hold stops against.
 
-use crate::segment::shared_stack;
+use crate::segment::real_stack;
 use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::mask::resample;
@@ -19,14 +19,14 @@ use rayon::prelude::*;
 type Field = Vec<[f64; 3]>;
 
 /// The real stack as it is segmented for the reference values.
-pub fn stack() -> Option<Specimen> {
-    let path = shared_stack()?;
+pub fn stack() -> Specimen {
+    let path = real_stack();
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().to_str().unwrap();
     let flags = ["--spacing", "0.0195", "--gaussian", "1", "--lower", "63"];
     let args = [&["segment", path.to_str().unwrap(), "-o", out], &flags[..]].concat();
     assert_eq!(crate::cli::run(&args).0, 0);
-    Some(bonepd_ct::command::segment::load(dir.path()).unwrap())
+    bonepd_ct::command::segment::load(dir.path()).unwrap()
 }
 
 /// Two voxels along every axis become one, bone where at least half of them are.
@@ -131,9 +131,9 @@ pub fn textbook(
 const FULL_MPA: f64 = 75.0451;
 
 #[test]
-#[ignore = "the real stack: some seconds"]
+#[ignore = "needs the real stack (BONEPD_STACK); some seconds"]
 fn the_real_stack_coarsened_twofold_has_its_converged_modulus() {
-    let Some(full) = stack() else { return };
+    let full = stack();
     // Textbook conjugate gradients to a residual of 1e-8 (below): energy and reaction agree in all these digits.
     let exact = 79.0256;
     let half = halved(&full);
@@ -151,9 +151,9 @@ fn the_real_stack_coarsened_twofold_has_its_converged_modulus() {
 }
 
 #[test]
-#[ignore = "the full stack: most of a minute"]
+#[ignore = "needs the real stack (BONEPD_STACK); most of a minute"]
 fn the_real_stack_has_its_converged_modulus() {
-    let Some(full) = stack() else { return };
+    let full = stack();
     for (tolerance, within) in [(1e-3, 1.5e-3), (1e-5, 2e-4)] {
         let params = SolveParams {
             tolerance,
@@ -169,9 +169,9 @@ fn the_real_stack_has_its_converged_modulus() {
 }
 
 #[test]
-#[ignore = "minutes of plain conjugate gradients"]
+#[ignore = "needs the real stack (BONEPD_STACK); minutes of plain conjugate gradients"]
 fn a_textbook_solver_on_the_real_stack() {
-    let Some(full) = stack() else { return };
+    let full = stack();
     let half = halved(&full);
     for ends in [Ends::Bonded, Ends::Free] {
         for (k, residual, energy, reaction) in textbook(&half, ends, 10_000, 1e-8) {

@@ -5,7 +5,7 @@ use crate::command::segment::load;
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
 use crate::export::{inp, vti, vtk};
-use crate::image::nifti;
+use crate::image::{nifti, orient};
 use crate::io::atomic;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
@@ -22,7 +22,7 @@ use crate::result::ffb::with_ffb;
 use crate::result::row::{FailureLoad, Marks, Row};
 use crate::result::settings::{BoundaryRule, CellType, Settings};
 use crate::solver::cg::CgStep;
-use crate::volume::Specimen;
+use crate::volume::{Specimen, Volume};
 use indicatif::ProgressBar;
 use std::path::Path;
 
@@ -243,15 +243,17 @@ fn solve_job(
 
 /// `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView.
 fn write_fields(dir: &Path, recorded: &Recorded) -> Result<()> {
-    for field in &recorded.fields {
-        let file = format!("field-{}.nii.gz", field.name.replace('_', "-"));
-        nifti::write(&dir.join(file), &field.values)?;
-    }
-    let arrays: Vec<_> = recorded
+    let back = specimen::axes(dir).inverse();
+    let stored: Vec<(&str, Volume<f32>)> = recorded
         .fields
         .iter()
-        .map(|f| (f.name, &f.values))
+        .map(|field| (field.name, orient::turned(field.values.clone(), &back)))
         .collect();
+    for (name, values) in &stored {
+        let file = format!("field-{}.nii.gz", name.replace('_', "-"));
+        nifti::write(&dir.join(file), values)?;
+    }
+    let arrays: Vec<_> = stored.iter().map(|(name, values)| (*name, values)).collect();
     vti::write(&dir.join("fields.vti"), &arrays)
 }
 

@@ -17,7 +17,9 @@ enum Use {
 
 /// Keys and their use from the table of a module's documentation.
 fn table(source: &str) -> Vec<(String, Use)> {
-    let rows = source.lines().filter_map(|line| line.strip_prefix("//! | "));
+    let rows = source
+        .lines()
+        .filter_map(|line| line.strip_prefix("//! | "));
     let found: Vec<(String, Use)> = rows
         .filter_map(|row| {
             let mut cells = row.split('|').map(str::trim);
@@ -170,7 +172,8 @@ fn nrrd() {
         }
         let space = key.starts_with("space") || key == "measurement frame";
         if space {
-            base.remove("spacings").set("space", "left-posterior-superior");
+            base.remove("spacings")
+                .set("space", "left-posterior-superior");
             base.set("space directions", "(0.02,0,0) (0,0.03,0) (0,0,0.04)");
         }
         if key == "space dimension" {
@@ -178,7 +181,11 @@ fn nrrd() {
         }
         let old = ["old min", "old max"].contains(&key);
         if old {
-            let other = if key == "old min" { "old max" } else { "old min" };
+            let other = if key == "old min" {
+                "old max"
+            } else {
+                "old min"
+            };
             base.set(other, "5");
         }
         let mut changed = base.clone();
@@ -259,7 +266,10 @@ fn metaimage() {
         let data = [scalars("int16", false, &values()), vec![10; 8]].concat();
         let files = |header: &Header| {
             vec![
-                ("a.mha".to_string(), [header.metaimage(), data.clone()].concat()),
+                (
+                    "a.mha".to_string(),
+                    [header.metaimage(), data.clone()].concat(),
+                ),
                 ("b.raw".to_string(), zlib(&[1; 48])),
             ]
         };
@@ -302,11 +312,14 @@ fn attribute(tag: [u16; 2]) -> (Slices, Slices, dicom::Syntax) {
     let mut base: Slices = vec![slices(1), slices(2)];
     let all = |base: &Slices, change: &Element| -> Slices {
         let mut changed = base.clone();
-        changed.iter_mut().for_each(|s| dicom::set(s, change.clone()));
+        changed
+            .iter_mut()
+            .for_each(|s| dicom::set(s, change.clone()));
         changed
     };
     let drop = |base: &mut Slices, tags: &[[u16; 2]]| {
-        base.iter_mut().for_each(|s| s.retain(|e| !tags.contains(&e.tag)));
+        base.iter_mut()
+            .for_each(|s| s.retain(|e| !tags.contains(&e.tag)));
     };
     let [position, orientation] = [[0x20, 0x32], [0x20, 0x37]];
     let group = |tag, inner: Element| items(tag, vec![vec![inner]]);
@@ -316,7 +329,9 @@ fn attribute(tag: [u16; 2]) -> (Slices, Slices, dicom::Syntax) {
         [2, 0x10] => {
             syntax.big_endian = true;
             // The bytes of the pixels stay, their order is now another.
-            let swapped = (0..6u16).map(|v| (v * 300).swap_bytes()).collect::<Vec<_>>();
+            let swapped = (0..6u16)
+                .map(|v| (v * 300).swap_bytes())
+                .collect::<Vec<_>>();
             dicom::pixels(&swapped)
         }
         [8, 8] => text(tag, "CS", "ORIGINAL\\PRIMARY\\LOCALIZER"),
@@ -378,7 +393,8 @@ fn attribute(tag: [u16; 2]) -> (Slices, Slices, dicom::Syntax) {
             short(tag, 12)
         }
         [0x28, 0x102] => {
-            base.iter_mut().for_each(|s| dicom::set(s, short([0x28, 0x101], 8)));
+            base.iter_mut()
+                .for_each(|s| dicom::set(s, short([0x28, 0x101], 8)));
             let mut before = base.clone();
             before.iter_mut().for_each(|s| dicom::set(s, short(tag, 7)));
             return (before, all(&base, &short(tag, 10)), syntax);
@@ -394,7 +410,8 @@ fn attribute(tag: [u16; 2]) -> (Slices, Slices, dicom::Syntax) {
         [0x28, 0x106] => short(tag, 5),
         [0x28, 0x120] => short(tag, 600),
         [0x28, 0x121] => {
-            base.iter_mut().for_each(|s| dicom::set(s, short([0x28, 0x120], 600)));
+            base.iter_mut()
+                .for_each(|s| dicom::set(s, short([0x28, 0x120], 600)));
             short(tag, 900)
         }
         [0x28, 0x1052] => text(tag, "DS", -1000),

@@ -53,17 +53,26 @@ fn places() -> impl Strategy<Value = Place> {
     let sizes = prop::array::uniform3(1..=5usize);
     let spacing = prop::array::uniform3(40..2000i32);
     let origin = prop::array::uniform3(-40_000..40_000i32);
-    let permutation = select(&[
-        [0, 1, 2],
-        [0, 2, 1],
-        [1, 0, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [2, 1, 0],
-    ][..]);
+    let permutation = select(
+        &[
+            [0, 1, 2],
+            [0, 2, 1],
+            [1, 0, 2],
+            [1, 2, 0],
+            [2, 0, 1],
+            [2, 1, 0],
+        ][..],
+    );
     let tilt = prop_oneof![Just(0.0f64), -0.3..0.3f64];
-    (sizes, spacing, origin, permutation, any::<[bool; 3]>(), tilt).prop_map(
-        |(n, spacing, origin, to, back, tilt)| {
+    (
+        sizes,
+        spacing,
+        origin,
+        permutation,
+        any::<[bool; 3]>(),
+        tilt,
+    )
+        .prop_map(|(n, spacing, origin, to, back, tilt)| {
             let (s, c) = tilt.sin_cos();
             // A turn about the axis (2, 1, 2) / 3.
             let u = [2.0 / 3.0, 1.0 / 3.0, 2.0 / 3.0];
@@ -84,8 +93,7 @@ fn places() -> impl Strategy<Value = Place> {
                 }),
                 origin: origin.map(|v| f64::from(v) * 1e-3),
             }
-        },
-    )
+        })
 }
 
 const KINDS: [&str; 10] = [
@@ -102,12 +110,7 @@ fn stored_values(kind: &str, place: &Place) -> Vec<f64> {
 }
 
 /// Reads `files` and holds each value to its place. `scale` is slope and intercept of the values.
-fn hold(
-    files: &Files,
-    place: &Place,
-    kind: &str,
-    scale: [f64; 2],
-) -> Result<(), TestCaseError> {
+fn hold(files: &Files, place: &Place, kind: &str, scale: [f64; 2]) -> Result<(), TestCaseError> {
     let scan = with(files, |path| scan::read(path, None))
         .map_err(|e| TestCaseError::fail(format!("refused: {e}")))?;
     let (volume, n) = (&scan.volume, scan.volume.grid.n);
@@ -124,7 +127,11 @@ fn hold(
         for r in 0..3 {
             let found = rows[r][3] + (0..3).map(|c| rows[r][c] * p[c] as f64).sum::<f64>();
             let error = (found - expected[r]).abs();
-            prop_assert!(error < 2e-5, "voxel {index} at {found}, not {}", expected[r]);
+            prop_assert!(
+                error < 2e-5,
+                "voxel {index} at {found}, not {}",
+                expected[r]
+            );
         }
     }
     for a in 0..3 {
@@ -177,7 +184,9 @@ fn quaternion(axes: [[f64; 3]; 3]) -> [f64; 3] {
     }
     // Half a turn: the axis by its largest part, its sign by the scalar part.
     let square: [f64; 3] = std::array::from_fn(|i| (0.25 * (1.0 + 2.0 * r(i, i) - trace)).max(0.0));
-    let i = (0..3).max_by(|a, b| square[*a].total_cmp(&square[*b])).unwrap();
+    let i = (0..3)
+        .max_by(|a, b| square[*a].total_cmp(&square[*b]))
+        .unwrap();
     let (j, k) = ((i + 1) % 3, (i + 2) % 3);
     let mut q = [0.0; 3];
     q[i] = square[i].sqrt();
@@ -217,16 +226,25 @@ fn nifti_headers(long: bool) {
         if sform {
             for (r, name) in ["srow_x", "srow_y", "srow_z"].into_iter().enumerate() {
                 let column = |a: usize| place.axes[a][r] * place.spacing[a] / mm;
-                h.set(name, &[column(0), column(1), column(2), place.origin[r] / mm]);
+                h.set(
+                    name,
+                    &[column(0), column(1), column(2), place.origin[r] / mm],
+                );
             }
             h.set("sform_code", &[2.0]);
         } else {
             let [a, b, c] = place.axes;
             let q = quaternion([a, b, c.map(|v| hand * v)]);
-            for (i, name) in ["quatern_b", "quatern_c", "quatern_d"].into_iter().enumerate() {
+            for (i, name) in ["quatern_b", "quatern_c", "quatern_d"]
+                .into_iter()
+                .enumerate()
+            {
                 h.set(name, &q[i..=i]);
             }
-            for (i, name) in ["qoffset_x", "qoffset_y", "qoffset_z"].into_iter().enumerate() {
+            for (i, name) in ["qoffset_x", "qoffset_y", "qoffset_z"]
+                .into_iter()
+                .enumerate()
+            {
                 h.set(name, &[place.origin[i] / mm]);
             }
             h.set("qform_code", &[1.0]);
@@ -247,7 +265,10 @@ fn nifti_headers(long: bool) {
             let offset = if two { 544 } else { 352 } + 16 * more;
             h.set("vox_offset", &[offset as f64]);
             let gap = vec![0; offset - h.bytes.len()];
-            vec![(format!("s.1.nii{gz}"), packed([h.bytes, gap, voxels].concat()))]
+            vec![(
+                format!("s.1.nii{gz}"),
+                packed([h.bytes, gap, voxels].concat()),
+            )]
         };
         hold(&files, &place, kind, scale)
     });
@@ -256,7 +277,10 @@ fn nifti_headers(long: bool) {
 /// Voxels of a header in one file, or cut into slices.
 fn pieces(voxels: &[u8], slices: usize, split: bool) -> Vec<Vec<u8>> {
     match split {
-        true => voxels.chunks(voxels.len() / slices).map(<[u8]>::to_vec).collect(),
+        true => voxels
+            .chunks(voxels.len() / slices)
+            .map(<[u8]>::to_vec)
+            .collect(),
         false => vec![voxels.to_vec()],
     }
 }
@@ -277,7 +301,15 @@ fn nrrd_headers(long: bool) {
         any::<[bool; 4]>(),
         select(&WHERE[..]),
         select(&["raw", "gzip", "bzip2", "hex", "text", "RAW", "GZ"][..]),
-        select(&[("um", 1e-3), ("\u{b5}m", 1e-3), ("mm", 1.0), ("cm", 10.0), ("", 1.0)][..]),
+        select(
+            &[
+                ("um", 1e-3),
+                ("\u{b5}m", 1e-3),
+                ("mm", 1.0),
+                ("cm", 10.0),
+                ("", 1.0),
+            ][..],
+        ),
         0..3usize,
         -1..9i64,
     );
@@ -287,18 +319,32 @@ fn nrrd_headers(long: bool) {
         let vector = |v: [f64; 3]| format!("({:?},{:?},{:?})", v[0] / mm, v[1] / mm, v[2] / mm);
         let column = |a: usize| vector(world.axes[a].map(|v| v * world.spacing[a]));
         let [nx, ny, nz] = place.n;
-        let (before, none, four) = if axis { ("1 ", "none ", "4") } else { ("", "", "3") };
+        let (before, none, four) = if axis {
+            ("1 ", "none ", "4")
+        } else {
+            ("", "", "3")
+        };
         let mut h = Header::new(&[
             ("content", "made"),
-            ("type", match (spelled, kind) {
-                (true, "uint8") => "Unsigned Char",
-                (true, "int16") => "SHORT",
-                (_, "float32") => "float",
-                (_, "float64") => "double",
-                (_, other) => other,
-            }),
+            (
+                "type",
+                match (spelled, kind) {
+                    (true, "uint8") => "Unsigned Char",
+                    (true, "int16") => "SHORT",
+                    (_, "float32") => "float",
+                    (_, "float64") => "double",
+                    (_, other) => other,
+                },
+            ),
             ("dimension", four),
-            (if lps { "space" } else { "Space" }, if lps { "LPS" } else { "right-anterior-superior" }),
+            (
+                if lps { "space" } else { "Space" },
+                if lps {
+                    "LPS"
+                } else {
+                    "right-anterior-superior"
+                },
+            ),
         ]);
         let last = |h: &mut Header, key: &str, value: String| h.0.push((key.into(), value));
         last(&mut h, "sizes", format!("{before}{nx} {ny} {nz}"));
@@ -306,34 +352,60 @@ fn nrrd_headers(long: bool) {
         last(&mut h, "space directions", directions);
         last(&mut h, "space origin", vector(world.origin));
         if !unit.is_empty() {
-            last(&mut h, "space units", format!("\"{unit}\" \"{unit}\" \"{unit}\""));
+            last(
+                &mut h,
+                "space units",
+                format!("\"{unit}\" \"{unit}\" \"{unit}\""),
+            );
         }
         last(&mut h, "encoding", encoding.into());
         last(&mut h, "endian", if big { "BIG" } else { "little" }.into());
         let coded = |part: &[u8], numbers: &[f64]| match encoding.to_lowercase().as_str() {
             "gzip" | "gz" => gzip(part),
             "bzip2" => bzip2(part),
-            "hex" => part.iter().map(|b| format!("{b:02x}\n")).collect::<String>().into_bytes(),
-            "text" => numbers.iter().map(|v| format!("{v} ")).collect::<String>().into_bytes(),
+            "hex" => part
+                .iter()
+                .map(|b| format!("{b:02x}\n"))
+                .collect::<String>()
+                .into_bytes(),
+            "text" => numbers
+                .iter()
+                .map(|v| format!("{v} "))
+                .collect::<String>()
+                .into_bytes(),
             _ => part.to_vec(),
         };
         let binary = !["hex", "text"].contains(&encoding);
         let skip = if binary { bytes } else { 0 };
-        last(&mut h, if spelled { "byteskip" } else { "byte skip" }, skip.to_string());
-        last(&mut h, if spelled { "lineskip" } else { "line skip" }, lines.to_string());
+        last(
+            &mut h,
+            if spelled { "byteskip" } else { "byte skip" },
+            skip.to_string(),
+        );
+        last(
+            &mut h,
+            if spelled { "lineskip" } else { "line skip" },
+            lines.to_string(),
+        );
         let numbers = stored_values(kind, &place);
         let voxels = scalars(kind, big, &numbers);
         let split = matches!(at, Where::List | Where::Pattern);
         let of = if split { nx * ny } else { nx * ny * nz };
-        let files = pieces(&voxels, nz, split).into_iter().zip(numbers.chunks(of)).map(|(part, numbers)| {
-            let skipped = if skip < 0 { 5 } else { skip as usize };
-            let padded = match binary {
-                true => [vec![3; skipped], part].concat(),
-                false => part,
-            };
-            [b"a line\n".repeat(lines), coded(&padded, numbers)].concat()
-        });
-        let mut files: Files = files.enumerate().map(|(k, f)| (format!("v 0{k}.bin"), f)).collect();
+        let files = pieces(&voxels, nz, split)
+            .into_iter()
+            .zip(numbers.chunks(of))
+            .map(|(part, numbers)| {
+                let skipped = if skip < 0 { 5 } else { skip as usize };
+                let padded = match binary {
+                    true => [vec![3; skipped], part].concat(),
+                    false => part,
+                };
+                [b"a line\n".repeat(lines), coded(&padded, numbers)].concat()
+            });
+        let mut files: Files = files
+            .enumerate()
+            .map(|(k, f)| (format!("v 0{k}.bin"), f))
+            .collect();
         match at {
             Where::After => {}
             Where::Beside => last(&mut h, "data file", "v 00.bin".into()),
@@ -375,7 +447,12 @@ fn metaimage_headers(long: bool) {
             (sizes, spacing) = ([sizes, vec![1]].concat(), [spacing, vec![1.0]].concat());
             origin.push(0.0);
         }
-        let words = |v: &[f64]| v.iter().map(|v| format!("{v:?}")).collect::<Vec<_>>().join(" ");
+        let words = |v: &[f64]| {
+            v.iter()
+                .map(|v| format!("{v:?}"))
+                .collect::<Vec<_>>()
+                .join(" ")
+        };
         let element = match kind {
             "uint8" => "MET_UCHAR",
             "int8" => "MET_CHAR",
@@ -390,17 +467,51 @@ fn metaimage_headers(long: bool) {
         };
         // Binary, compressed, text.
         let (compressed, text) = (coding == 1, coding == 2);
-        let skip = if text || (compressed && bytes < 0) || at == Where::After { 0 } else { bytes };
-        let mut h = Header::new(&[("ObjectType", "Image"), ("NDims", if four { "4" } else { "3" })]);
+        let skip = if text || (compressed && bytes < 0) || at == Where::After {
+            0
+        } else {
+            bytes
+        };
+        let mut h = Header::new(&[
+            ("ObjectType", "Image"),
+            ("NDims", if four { "4" } else { "3" }),
+        ]);
         let mut last = |key: &str, value: String| h.0.push((key.into(), value));
-        last("DimSize", sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
-        last(if size { "ElementSize" } else { "ElementSpacing" }, words(&spacing));
-        last(if spelled { "Orientation" } else { "TransformMatrix" }, words(&matrix));
+        last(
+            "DimSize",
+            sizes
+                .iter()
+                .map(usize::to_string)
+                .collect::<Vec<_>>()
+                .join(" "),
+        );
+        last(
+            if size {
+                "ElementSize"
+            } else {
+                "ElementSpacing"
+            },
+            words(&spacing),
+        );
+        last(
+            if spelled {
+                "Orientation"
+            } else {
+                "TransformMatrix"
+            },
+            words(&matrix),
+        );
         last(if spelled { "Position" } else { "Offset" }, words(&origin));
         last("ElementType", element.into());
-        last("ElementByteOrderMSB", if big { "True" } else { "False" }.into());
+        last(
+            "ElementByteOrderMSB",
+            if big { "True" } else { "False" }.into(),
+        );
         last("BinaryData", if text { "False" } else { "True" }.into());
-        last("CompressedData", if compressed { "True" } else { "False" }.into());
+        last(
+            "CompressedData",
+            if compressed { "True" } else { "False" }.into(),
+        );
         last("HeaderSize", skip.to_string());
         if !unit.is_empty() {
             last("DistanceUnits", unit.into());
@@ -414,7 +525,9 @@ fn metaimage_headers(long: bool) {
         let [nx, ny, nz] = place.n;
         let split = matches!(at, Where::List | Where::Pattern);
         let of = if split { nx * ny } else { nx * ny * nz };
-        let parts = pieces(&voxels, nz, split).into_iter().zip(numbers.chunks(of));
+        let parts = pieces(&voxels, nz, split)
+            .into_iter()
+            .zip(numbers.chunks(of));
         let mut files: Files = parts
             .enumerate()
             .map(|(k, (part, numbers))| {
@@ -428,12 +541,19 @@ fn metaimage_headers(long: bool) {
             })
             .collect();
         let names: Vec<String> = files.iter().map(|f| f.0.clone()).collect();
-        last("ElementDataFile", match at {
-            Where::After => "LOCAL".into(),
-            Where::Beside => names[0].clone(),
-            Where::Pattern => format!("v%02d.raw 0 {} 1", nz - 1),
-            Where::List => format!("LIST{}\n{}", if spelled { " 2D" } else { "" }, names.join("\n")),
-        });
+        last(
+            "ElementDataFile",
+            match at {
+                Where::After => "LOCAL".into(),
+                Where::Beside => names[0].clone(),
+                Where::Pattern => format!("v%02d.raw 0 {} 1", nz - 1),
+                Where::List => format!(
+                    "LIST{}\n{}",
+                    if spelled { " 2D" } else { "" },
+                    names.join("\n")
+                ),
+            },
+        );
         let header = match at {
             Where::After => [h.metaimage(), files.remove(0).1].concat(),
             _ => h.metaimage(),
@@ -496,7 +616,10 @@ fn dicom_headers(long: bool) {
             dicom::set(&mut e, dicom::short([0x28, 0x101], stored));
             dicom::set(&mut e, dicom::short([0x28, 0x102], stored - 1));
             dicom::set(&mut e, dicom::short([0x28, 0x103], u16::from(signed)));
-            e.push(items([0x40, 0x275], vec![vec![text([0x40, 7], "LO", "request")]]));
+            e.push(items(
+                [0x40, 0x275],
+                vec![vec![text([0x40, 7], "LO", "request")]],
+            ));
             e.push(text([0x18, 0x50], "DS", world.spacing[2]));
             e
         };
@@ -527,12 +650,23 @@ fn dicom_headers(long: bool) {
             e.push(text([0x28, 8], "IS", nz));
             let one = |tag, inner: Vec<Element>| items(tag, vec![inner]);
             let shared = vec![
-                one([0x28, 0x9110], vec![text([0x28, 0x30], "DS", &pixel), text([0x18, 0x50], "DS", world.spacing[2])]),
+                one(
+                    [0x28, 0x9110],
+                    vec![
+                        text([0x28, 0x30], "DS", &pixel),
+                        text([0x18, 0x50], "DS", world.spacing[2]),
+                    ],
+                ),
                 one([0x20, 0x9116], vec![text([0x20, 0x37], "DS", &directions)]),
                 one([0x28, 0x9145], rescale()),
             ];
             e.push(items([0x5200, 0x9229], vec![shared]));
-            let of = |k: &usize| vec![one([0x20, 0x9113], vec![text([0x20, 0x32], "DS", position(*k))])];
+            let of = |k: &usize| {
+                vec![one(
+                    [0x20, 0x9113],
+                    vec![text([0x20, 0x32], "DS", position(*k))],
+                )]
+            };
             e.push(items([0x5200, 0x9230], order.iter().map(of).collect()));
             e.push(pixels(order.iter().map(|k| slices[*k]).collect()));
             vec![("IM0".into(), syntax.file(&e))]

@@ -253,7 +253,10 @@ fn write_fields(dir: &Path, recorded: &Recorded) -> Result<()> {
         let file = format!("field-{}.nii.gz", name.replace('_', "-"));
         nifti::write(&dir.join(file), values)?;
     }
-    let arrays: Vec<_> = stored.iter().map(|(name, values)| (*name, values)).collect();
+    let arrays: Vec<_> = stored
+        .iter()
+        .map(|(name, values)| (*name, values))
+        .collect();
     vti::write(&dir.join("fields.vti"), &arrays)
 }
 

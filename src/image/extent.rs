@@ -29,7 +29,10 @@ pub fn of(path: &Path) -> Option<Extent> {
     }
     let name = path.file_name()?.to_string_lossy().to_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
-    if [".nii", ".hdr", ".img"].iter().any(|end| name.ends_with(end)) {
+    if [".nii", ".hdr", ".img"]
+        .iter()
+        .any(|end| name.ends_with(end))
+    {
         let (voxels, spacing_mm) = nifti::extent(path)?;
         return Some(Extent { voxels, spacing_mm });
     }

@@ -92,11 +92,19 @@ impl Syntax {
     }
 
     fn u16(&self, v: u16) -> [u8; 2] {
-        if self.big_endian { v.to_be_bytes() } else { v.to_le_bytes() }
+        if self.big_endian {
+            v.to_be_bytes()
+        } else {
+            v.to_le_bytes()
+        }
     }
 
     fn u32(&self, v: u32) -> [u8; 4] {
-        if self.big_endian { v.to_be_bytes() } else { v.to_le_bytes() }
+        if self.big_endian {
+            v.to_be_bytes()
+        } else {
+            v.to_le_bytes()
+        }
     }
 
     fn tag(&self, tag: [u16; 2]) -> Vec<u8> {
@@ -159,7 +167,11 @@ impl Syntax {
         for item in items {
             let content: Vec<u8> = item.iter().flat_map(|e| inner.element(e)).collect();
             body.extend(self.tag([0xFFFE, 0xE000]));
-            let length = if self.open { u32::MAX } else { content.len() as u32 };
+            let length = if self.open {
+                u32::MAX
+            } else {
+                content.len() as u32
+            };
             body.extend(self.u32(length));
             body.extend(content);
             if self.open {
@@ -171,7 +183,11 @@ impl Syntax {
             body.extend(self.tag([0xFFFE, 0xE0DD]));
             body.extend(self.u32(0));
         }
-        let length = if self.open { u32::MAX } else { body.len() as u32 };
+        let length = if self.open {
+            u32::MAX
+        } else {
+            body.len() as u32
+        };
         let vr = if unknown { "UN" } else { "SQ" };
         [self.head(tag, vr, length), body].concat()
     }
@@ -185,11 +201,15 @@ impl Syntax {
         }
         if self.deflated {
             use std::io::Write;
-            let mut out = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::fast());
+            let mut out =
+                flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::fast());
             out.write_all(&body).unwrap();
             body = out.finish().unwrap();
         }
-        let plain = Syntax { meta: false, ..EXPLICIT };
+        let plain = Syntax {
+            meta: false,
+            ..EXPLICIT
+        };
         let syntax = text([2, 0x10], "UI", self.uid());
         let meta = match self.meta {
             true => plain.element(&syntax),
@@ -218,7 +238,11 @@ pub fn rle(words: &[u16]) -> Vec<u8> {
         let mut out = Vec::new();
         let mut at = 0;
         while at < bytes.len() {
-            let run = bytes[at..].iter().take_while(|b| **b == bytes[at]).count().min(128);
+            let run = bytes[at..]
+                .iter()
+                .take_while(|b| **b == bytes[at])
+                .count()
+                .min(128);
             if run > 1 {
                 out.extend([(257 - run) as u8, bytes[at]]);
             } else {

@@ -32,7 +32,10 @@ const NAMES: [(&str, &str); 17] = [
 
 pub fn name(syntax: &str) -> String {
     let found = NAMES.iter().find(|(uid, _)| *uid == syntax);
-    found.map_or_else(|| format!("transfer syntax {syntax}"), |(_, name)| name.to_string())
+    found.map_or_else(
+        || format!("transfer syntax {syntax}"),
+        |(_, name)| name.to_string(),
+    )
 }
 
 pub fn codec(syntax: &str) -> Option<Codec> {
@@ -114,7 +117,10 @@ fn rle(frame: &[u8], pixels: usize, bytes: usize) -> Result<Vec<u8>, String> {
     }
     // A run of two bytes makes at most 128.
     if pixels > frame.len().saturating_mul(64) {
-        return Err(format!("{pixels} pixels cannot come of {} bytes", frame.len()));
+        return Err(format!(
+            "{pixels} pixels cannot come of {} bytes",
+            frame.len()
+        ));
     }
     let mut out = vec![0; pixels * bytes];
     for segment in 0..bytes {
@@ -123,7 +129,9 @@ fn rle(frame: &[u8], pixels: usize, bytes: usize) -> Result<Vec<u8>, String> {
             true => word(2 + segment).unwrap_or(0),
             false => frame.len(),
         };
-        let packed = frame.get(from..to).ok_or("its RLE segments lie outside their frame")?;
+        let packed = frame
+            .get(from..to)
+            .ok_or("its RLE segments lie outside their frame")?;
         unpack(packed, &mut out[bytes - 1 - segment..], bytes, pixels)?;
     }
     Ok(out)
@@ -145,7 +153,9 @@ fn unpack(packed: &[u8], out: &mut [u8], step: usize, pixels: usize) -> Result<(
         };
         let run = count.min(left);
         if head < 128 {
-            let literal = packed.get(at..at + run).ok_or("its RLE data end inside a run")?;
+            let literal = packed
+                .get(at..at + run)
+                .ok_or("its RLE data end inside a run")?;
             literal.iter().for_each(|v| {
                 if let Some(place) = places.next() {
                     *place = *v;

@@ -119,7 +119,11 @@ impl Data {
         let start = match bytes.get(128..132) {
             Some(b"DICM") => 132,
             _ if without_preamble(&bytes) => 0,
-            _ => return Err("it does not hold the word DICM, nor does it begin with elements".into()),
+            _ => {
+                return Err(
+                    "it does not hold the word DICM, nor does it begin with elements".into(),
+                );
+            }
         };
         let (from, syntax) = meta(&bytes, start)?;
         let data = Data {
@@ -282,7 +286,10 @@ impl<'a> Walk<'a> {
                 return Ok(set);
             }
             if tag[0] == 0xFFFE {
-                return Err(format!("an item begins or ends out of place at byte {}", self.at));
+                return Err(format!(
+                    "an item begins or ends out of place at byte {}",
+                    self.at
+                ));
             }
             let value = self.value(tag, vr, length)?;
             set.elements.push((tag, value));
@@ -407,7 +414,10 @@ mod tests {
             [&head, value].concat()
         };
         let name = element([8, 0x60], b"CS", b"CT");
-        for (value, expected) in [(un(item.len() as u32, &item), 2.0), (un(UNDEFINED, &open), 3.0)] {
+        for (value, expected) in [
+            (un(item.len() as u32, &item), 2.0),
+            (un(UNDEFINED, &open), 3.0),
+        ] {
             let file = [name.clone(), value, element([0x28, 0x10], b"US", &[7, 0])].concat();
             let data = Data::new(file).unwrap();
             let set = data.elements().unwrap();

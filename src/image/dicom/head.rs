@@ -7,7 +7,8 @@ use super::scale;
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-pub const ADVICE: &str = "convert the series to NIfTI (dcm2niix), or export it again as uncompressed DICOM";
+pub const ADVICE: &str =
+    "convert the series to NIfTI (dcm2niix), or export it again as uncompressed DICOM";
 
 /// The file's elements, however they are coded.
 pub fn data(path: &Path) -> Result<Data> {
@@ -126,18 +127,21 @@ fn codec(syntax: &str, path: &Path) -> Result<Codec> {
 /// How one sample is stored.
 fn coding(set: &Set, path: &Path) -> Result<Coding> {
     let refused = |found: String, advice: &str| Err(Error::file(path, found, advice));
-    let photometric = set
-        .text([0x28, 4])
-        .unwrap_or_else(|| "MONOCHROME2".into());
+    let photometric = set.text([0x28, 4]).unwrap_or_else(|| "MONOCHROME2".into());
     let samples = set.short([0x28, 2]).unwrap_or(1);
     if samples != 1 || !photometric.starts_with("MONOCHROME") {
         return refused(
-            format!("is a colour image ({photometric}, {samples} samples a pixel), grey values are expected"),
+            format!(
+                "is a colour image ({photometric}, {samples} samples a pixel), grey values are expected"
+            ),
             "remove it from the folder, or export grey values",
         );
     }
     if set.get([0x7FE0, 8]).is_some() || set.get([0x7FE0, 9]).is_some() {
-        return refused("holds pixels that are floating-point numbers, which are not read".into(), ADVICE);
+        return refused(
+            "holds pixels that are floating-point numbers, which are not read".into(),
+            ADVICE,
+        );
     }
     let allocated = set.short([0x28, 0x100]).unwrap_or(0);
     match allocated {
@@ -149,7 +153,10 @@ fn coding(set: &Set, path: &Path) -> Result<Coding> {
             );
         }
         other => {
-            return refused(format!("holds {other}-bit pixels, which are not read"), ADVICE);
+            return refused(
+                format!("holds {other}-bit pixels, which are not read"),
+                ADVICE,
+            );
         }
     }
     if set.get(PIXEL_DATA).is_none() {
@@ -215,7 +222,10 @@ fn frames(set: &Set, path: &Path, file: usize, count: usize, signed: bool) -> Re
     if !own.is_empty() && own.len() != count {
         return Err(Error::file(
             path,
-            format!("describes {} frames and says that it holds {count}", own.len()),
+            format!(
+                "describes {} frames and says that it holds {count}",
+                own.len()
+            ),
             ADVICE,
         ));
     }
@@ -239,14 +249,21 @@ fn frames(set: &Set, path: &Path, file: usize, count: usize, signed: bool) -> Re
         .collect()
 }
 
-fn frame(groups: &Groups, path: &Path, (file, index): (usize, usize), signed: bool) -> Result<Frame> {
+fn frame(
+    groups: &Groups,
+    path: &Path,
+    (file, index): (usize, usize),
+    signed: bool,
+) -> Result<Frame> {
     let top = groups.top;
     let directions = groups.decimals::<6>(ORIENTATION[0], ORIENTATION[1]);
     let directions = directions.filter(|d| d.iter().any(|v| *v != 0.0));
     if directions.is_some_and(|d| !are_unit(&d)) {
         return Err(Error::file(
             path,
-            format!("ImageOrientationPatient should be two unit vectors at a right angle, it is {directions:?}"),
+            format!(
+                "ImageOrientationPatient should be two unit vectors at a right angle, it is {directions:?}"
+            ),
             ADVICE,
         ));
     }

@@ -183,7 +183,9 @@ fn values(images: &[Image], frames: &[Frame], [nx, ny, nz]: [usize; 3]) -> Resul
 fn further(images: &[Image]) -> Vec<String> {
     let mut notes = Vec::new();
     if images.iter().any(|image| image.lossy) {
-        notes.push("the series was once compressed with loss: its values are not the scanner's".into());
+        notes.push(
+            "the series was once compressed with loss: its values are not the scanner's".into(),
+        );
     }
     if images.iter().any(|image| image.other_scales) {
         notes.push("the series names a further scale of its values (RealWorldValueMapping), which is not used".into());
@@ -197,7 +199,10 @@ fn affine(first: &Frame, spacing_mm: Option<[f64; 3]>) -> Option<Affine> {
     let normal = normal(&d);
     let origin = first.position_mm.unwrap_or([0.0; 3]);
     let directions: Affine = std::array::from_fn(|r| [d[r], d[3 + r], normal[r], origin[r]]);
-    Some(scaled(&from_lps(directions), spacing_mm.unwrap_or([1.0; 3])))
+    Some(scaled(
+        &from_lps(directions),
+        spacing_mm.unwrap_or([1.0; 3]),
+    ))
 }
 
 /// Whether a file is DICOM by its first bytes, whatever its name.

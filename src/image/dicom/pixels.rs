@@ -2,7 +2,7 @@
 
 use super::compressed;
 use super::elements::{PIXEL_DATA, Value};
-use super::head::{self, Image, ADVICE, unsound};
+use super::head::{self, ADVICE, Image, unsound};
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 
@@ -79,9 +79,16 @@ pub fn decode(image: &Image, slices: Vec<(usize, &mut [f32])>) -> Result<()> {
                     bytes.len()
                 )));
             }
-            bytes.chunks_exact(frame_bytes).map(|frame| vec![frame]).collect()
+            bytes
+                .chunks_exact(frame_bytes)
+                .map(|frame| vec![frame])
+                .collect()
         }
-        _ => return Err(wrong("its pixels are not coded as its transfer syntax says".into())),
+        _ => {
+            return Err(wrong(
+                "its pixels are not coded as its transfer syntax says".into(),
+            ));
+        }
     };
     for (index, out) in slices {
         let stored = match image.codec {
@@ -94,7 +101,13 @@ pub fn decode(image: &Image, slices: Vec<(usize, &mut [f32])>) -> Result<()> {
         };
         // Compressed samples are little-endian, whatever the file is.
         let big_endian = set.big_endian && image.codec.is_none();
-        convert(&stored, &image.coding, big_endian, &image.frames[index].scale, out);
+        convert(
+            &stored,
+            &image.coding,
+            big_endian,
+            &image.frames[index].scale,
+            out,
+        );
     }
     Ok(())
 }
@@ -105,7 +118,9 @@ fn convert(stored: &[u8], coding: &Coding, big_endian: bool, scale: &Scale, out:
         ([low, high], false) | ([high, low], true) => u16::from_le_bytes([*low, *high]),
         _ => 0,
     };
-    let numbers = stored.chunks_exact(coding.bytes).map(|b| coding.number(word(b)));
+    let numbers = stored
+        .chunks_exact(coding.bytes)
+        .map(|b| coding.number(word(b)));
     let each = out.iter_mut().zip(numbers);
     match (&scale.table, scale.slope, scale.intercept) {
         (Some(table), ..) => each.for_each(|(out, v)| *out = table.value(v)),

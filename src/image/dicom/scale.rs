@@ -73,13 +73,24 @@ fn table(item: &Set, path: &Path, signed: bool) -> Result<Table> {
         item.shorts([0x28, 0x3002]).first_chunk::<3>(),
         values.is_empty(),
     ) else {
-        return Err(Error::file(path, "has a Modality LUT without its table", ADVICE));
+        return Err(Error::file(
+            path,
+            "has a Modality LUT without its table",
+            ADVICE,
+        ));
     };
-    let count = if count == 0 { 65536 } else { usize::from(count) };
+    let count = if count == 0 {
+        65536
+    } else {
+        usize::from(count)
+    };
     if values.len() < count {
         return Err(Error::file(
             path,
-            format!("has a Modality LUT of {} values where it promises {count}", values.len()),
+            format!(
+                "has a Modality LUT of {} values where it promises {count}",
+                values.len()
+            ),
             ADVICE,
         ));
     }

@@ -122,7 +122,9 @@ fn even(
             "lies {gap:.4} mm after the slice before it, where slices are {mean:.4} mm apart on average"
         ),
         match gap < 1e-6 {
-            true => "two slices lie at one place: keep one time, echo or reconstruction in the folder",
+            true => {
+                "two slices lie at one place: keep one time, echo or reconstruction in the folder"
+            }
             false => "a slice is missing or doubled: export the whole series",
         },
     ))
@@ -148,7 +150,9 @@ pub fn same(first: &Frame, other: &Frame, images: &[Image]) -> Result<()> {
         );
     }
     let close = |x: &[f64], y: &[f64], tolerance: f64| {
-        x.iter().zip(y).all(|(x, y)| (x - y).abs() <= tolerance * x.abs().max(1e-3))
+        x.iter()
+            .zip(y)
+            .all(|(x, y)| (x - y).abs() <= tolerance * x.abs().max(1e-3))
     };
     let same_pixel = match (first.pixel_mm, other.pixel_mm) {
         (Some(x), Some(y)) => close(&x, &y, 1e-3),
@@ -169,7 +173,9 @@ pub fn same(first: &Frame, other: &Frame, images: &[Image]) -> Result<()> {
         (None, None) => 0.0,
         _ => 1.0,
     };
-    if angle > 2e-3 || first.position_mm.is_some() != other.position_mm.is_some() && first.file != other.file {
+    if angle > 2e-3
+        || first.position_mm.is_some() != other.position_mm.is_some() && first.file != other.file
+    {
         return differs(
             "slice of another orientation than the first, or one without its place".into(),
             "keep one series in a folder, without localisers",
@@ -189,5 +195,7 @@ pub fn same(first: &Frame, other: &Frame, images: &[Image]) -> Result<()> {
 }
 
 fn words(pixel_mm: Option<[f64; 2]>) -> String {
-    pixel_mm.map_or("unknown".into(), |[row, column]| format!("{column} × {row}"))
+    pixel_mm.map_or("unknown".into(), |[row, column]| {
+        format!("{column} × {row}")
+    })
 }

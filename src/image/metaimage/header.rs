@@ -57,16 +57,18 @@ pub fn read(path: &Path) -> Result<Header> {
     let mut list = false;
     loop {
         line.clear();
-        let got = source.read_until(b'\n', &mut line).map_err(|e| {
-            Error::file(path, format!("its header cannot be read: {e}"), ADVICE)
-        })?;
+        let got = source
+            .read_until(b'\n', &mut line)
+            .map_err(|e| Error::file(path, format!("its header cannot be read: {e}"), ADVICE))?;
         if got == 0 && list {
             return Ok(header);
         }
         let text = String::from_utf8_lossy(&line);
         let text = text.trim();
         if list {
-            header.listed.extend((!text.is_empty()).then(|| text.to_string()));
+            header
+                .listed
+                .extend((!text.is_empty()).then(|| text.to_string()));
             continue;
         }
         header.length += got as u64;

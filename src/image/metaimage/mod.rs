@@ -62,7 +62,10 @@ pub fn read(path: &Path) -> Result<Stored> {
     let spacing_mm = spacing(&header, path, &mut notes)?;
     let affine = affine(&header, spacing_mm, path, &mut notes)?;
     if header.starts_with("Seq_Frame") {
-        notes.push("the header describes a sequence of frames: if the third axis is time, this is no scan".into());
+        notes.push(
+            "the header describes a sequence of frames: if the third axis is time, this is no scan"
+                .into(),
+        );
     }
     if (layout.slope, layout.intercept) != (1.0, 0.0) {
         notes.push(format!(
@@ -93,7 +96,10 @@ pub fn read(path: &Path) -> Result<Stored> {
 /// The files of voxels that a header names; none where they follow it.
 pub fn data_files(path: &Path) -> Vec<PathBuf> {
     let header = header::read(path);
-    header.map_or_else(|_| Vec::new(), |h| data::files(&h, path).unwrap_or_default())
+    header.map_or_else(
+        |_| Vec::new(),
+        |h| data::files(&h, path).unwrap_or_default(),
+    )
 }
 
 fn layout(header: &Header, path: &Path) -> Result<Layout> {
@@ -207,7 +213,11 @@ fn spacing(header: &Header, path: &Path, notes: &mut Vec<String>) -> Result<Opti
             "the distance between slices is not in the file: taken as the pixel's height".into(),
         );
     }
-    let all = [found[0], found[1], found.get(2).copied().unwrap_or(found[1])];
+    let all = [
+        found[0],
+        found[1],
+        found.get(2).copied().unwrap_or(found[1]),
+    ];
     Ok(Some(all.map(|v| v * to_mm)).filter(|s| s.iter().all(|v| *v > 0.0)))
 }
 
@@ -222,10 +232,16 @@ fn affine(
         let Some(key) = keys.into_iter().find(|key| header.get(key).is_some()) else {
             return Ok(None);
         };
-        let found = header.numbers(key).filter(|m| m.iter().all(|v| v.is_finite()));
+        let found = header
+            .numbers(key)
+            .filter(|m| m.iter().all(|v| v.is_finite()));
         match found {
             Some(found) => Ok(Some(found)),
-            None => Err(Error::file(path, format!("{key} holds no finite numbers"), ADVICE)),
+            None => Err(Error::file(
+                path,
+                format!("{key} holds no finite numbers"),
+                ADVICE,
+            )),
         }
     };
     let matrix = numbers(["TransformMatrix", "Rotation", "Orientation"])?;

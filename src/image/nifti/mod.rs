@@ -290,10 +290,7 @@ mod tests {
             let expected: Vec<f32> = sample().as_slice().iter().map(|&v| f32::from(v)).collect();
             assert_eq!(back.values, expected);
             assert!(back.notes.is_empty(), "{:?}", back.notes);
-            assert_eq!(
-                extent(&path),
-                Some(([3, 4, 5], Some([0.0195, 0.02, 0.03])))
-            );
+            assert_eq!(extent(&path), Some(([3, 4, 5], Some([0.0195, 0.02, 0.03]))));
         }
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
     }

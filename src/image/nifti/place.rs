@@ -33,7 +33,10 @@ fn unit_mm(h: &Header, path: &Path, notes: &mut Vec<String>) -> Result<f64> {
         return length::millimetres_per(&h.vox_units).ok_or_else(|| {
             Error::file(
                 path,
-                format!("gives its voxel size in `{}`, which is no known unit of length", h.vox_units),
+                format!(
+                    "gives its voxel size in `{}`, which is no known unit of length",
+                    h.vox_units
+                ),
                 "write vox_units as mm or um, or save it as NIfTI",
             )
         });
@@ -48,7 +51,9 @@ fn unit_mm(h: &Header, path: &Path, notes: &mut Vec<String>) -> Result<f64> {
         }
         code => Err(Error::file(
             path,
-            format!("gives its voxel size in NIfTI unit {code}, which does not exist (1 is metre, 2 millimetre, 3 micrometre)"),
+            format!(
+                "gives its voxel size in NIfTI unit {code}, which does not exist (1 is metre, 2 millimetre, 3 micrometre)"
+            ),
             "set xyzt_units and save it again",
         )),
     }

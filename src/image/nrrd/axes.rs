@@ -52,7 +52,8 @@ pub fn axes(header: &Header, path: &Path, notes: &mut Vec<String>) -> Result<Axe
         Some(rows) => Some(column_norms(rows)),
         None => spacing(&kept, notes),
     };
-    let affine = affine.filter(|_| header.get("space").is_some() || header.get("spacedimension").is_some());
+    let affine =
+        affine.filter(|_| header.get("space").is_some() || header.get("spacedimension").is_some());
     Ok(Axes {
         n,
         spacing_mm,
@@ -62,13 +63,17 @@ pub fn axes(header: &Header, path: &Path, notes: &mut Vec<String>) -> Result<Axe
 
 fn each<'a>(header: &'a Header, sizes: &[usize], path: &Path) -> Result<Vec<Axis<'a>>> {
     let directions = match header.get("spacedirections") {
-        Some(text) => Some(vectors(text).filter(|v| v.len() == sizes.len()).ok_or_else(|| {
-            Error::file(
-                path,
-                format!("its space directions are no vectors, one an axis: `{text}`"),
-                ADVICE,
-            )
-        })?),
+        Some(text) => Some(
+            vectors(text)
+                .filter(|v| v.len() == sizes.len())
+                .ok_or_else(|| {
+                    Error::file(
+                        path,
+                        format!("its space directions are no vectors, one an axis: `{text}`"),
+                        ADVICE,
+                    )
+                })?,
+        ),
         None => None,
     };
     let kinds = header.words("kinds");
@@ -203,7 +208,9 @@ fn affine(
     };
     if let [x, y] = columns[..] {
         columns.push(upright(x, y));
-        notes.push("the distance between slices is not in the file: taken as the pixel's height".into());
+        notes.push(
+            "the distance between slices is not in the file: taken as the pixel's height".into(),
+        );
     }
     let origin = header.get("spaceorigin").and_then(vectors);
     let origin = origin.and_then(|v| v.first().copied().flatten());
@@ -217,7 +224,9 @@ fn affine(
         let o = origin.map_or(0.0, |o| o[r]);
         *row = [columns[0][r], columns[1][r], columns[2][r], o].map(|v| v * signs[r] * mm);
     }
-    let usable = column_norms(&rows).iter().all(|l| l.is_finite() && *l > 0.0);
+    let usable = column_norms(&rows)
+        .iter()
+        .all(|l| l.is_finite() && *l > 0.0);
     match usable {
         true => Ok(Some(rows)),
         false => Err(Error::file(
@@ -265,7 +274,8 @@ fn spacing(kept: &[Axis], notes: &mut Vec<String>) -> Option<[f64; 3]> {
         [x, y] => {
             let (x, y) = (x.spacing_mm?, y.spacing_mm?);
             notes.push(
-                "the distance between slices is not in the file: taken as the pixel's height".into(),
+                "the distance between slices is not in the file: taken as the pixel's height"
+                    .into(),
             );
             Some([x, y, y])
         }

@@ -152,9 +152,9 @@ fn stream(path: &Path, encoding: Encoding, start: u64, lines: i64) -> Result<Box
     raw::skip(&mut source, start);
     for _ in 0..lines {
         let mut line = Vec::new();
-        let got = source.read_until(b'\n', &mut line).map_err(|e| {
-            Error::file(path, format!("its lines cannot be skipped: {e}"), ADVICE)
-        })?;
+        let got = source
+            .read_until(b'\n', &mut line)
+            .map_err(|e| Error::file(path, format!("its lines cannot be skipped: {e}"), ADVICE))?;
         if got == 0 {
             return Err(Error::file(
                 path,

@@ -95,9 +95,9 @@ pub fn read(path: &Path) -> Result<Header> {
     let mut line = Vec::new();
     loop {
         line.clear();
-        let got = source.read_until(b'\n', &mut line).map_err(|e| {
-            Error::file(path, format!("its header cannot be read: {e}"), ADVICE)
-        })?;
+        let got = source
+            .read_until(b'\n', &mut line)
+            .map_err(|e| Error::file(path, format!("its header cannot be read: {e}"), ADVICE))?;
         header.length += got as u64;
         let text = String::from_utf8_lossy(&line);
         let text = text.trim_end();

@@ -79,7 +79,10 @@ pub fn read(path: &Path) -> Result<Stored> {
 /// The files of voxels that a header names; none where they follow it.
 pub fn data_files(path: &Path) -> Vec<PathBuf> {
     let header = header::read(path);
-    header.map_or_else(|_| Vec::new(), |h| data::files(&h, path).unwrap_or_default())
+    header.map_or_else(
+        |_| Vec::new(),
+        |h| data::files(&h, path).unwrap_or_default(),
+    )
 }
 
 fn layout(header: &Header, n: [usize; 3], path: &Path) -> Result<Layout> {
@@ -124,8 +127,13 @@ fn scalar(kind: &str) -> Option<Scalar> {
         "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => {
             Scalar::U64
         }
-        "longlong" | "long long" | "long long int" | "signed long long"
-        | "signed long long int" | "int64" | "int64_t" => Scalar::I64,
+        "longlong"
+        | "long long"
+        | "long long int"
+        | "signed long long"
+        | "signed long long int"
+        | "int64"
+        | "int64_t" => Scalar::I64,
         "float" => Scalar::F32,
         "double" => Scalar::F64,
         _ => return None,

@@ -17,7 +17,10 @@ pub fn names(text: &str) -> Option<Vec<String>> {
     let pattern = words[..at].join(" ");
     let (before, rest) = pattern.split_once('%')?;
     let digits = rest.chars().take_while(char::is_ascii_digit).count();
-    let (width, after) = (&rest[..digits], rest[digits..].strip_prefix(['d', 'i', 'u'])?);
+    let (width, after) = (
+        &rest[..digits],
+        rest[digits..].strip_prefix(['d', 'i', 'u'])?,
+    );
     let (first, last) = (numbers[0], numbers[1]);
     let step = numbers.get(2).copied().unwrap_or(1);
     let fits = step != 0 && last.checked_sub(first)?.checked_div(step)? < MOST;
@@ -45,7 +48,13 @@ mod tests {
         assert_eq!(of("a b%d 4 0 -2"), ["a b4", "a b2", "a b0"]);
         assert_eq!(of("%2d.z 9 10 1 2"), [" 9.z", "10.z"]);
         assert_eq!(of("s%d.raw 1 2"), ["s1.raw", "s2.raw"]);
-        for no in ["scan.raw", "100%d", "a %d 0 9 0", "a%d 0 99999999999 1", "a%s 0 1 1"] {
+        for no in [
+            "scan.raw",
+            "100%d",
+            "a %d 0 9 0",
+            "a%d 0 99999999999 1",
+            "a%s 0 1 1",
+        ] {
             assert_eq!(names(no), None, "{no}");
         }
     }

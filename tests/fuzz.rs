@@ -8,6 +8,7 @@
 
 mod allocation;
 mod damage;
+mod headers;
 mod samples;
 
 use bonepd_ct::cohort::scans;

@@ -2,6 +2,7 @@
 //! sound program writes.
 
 pub mod dicom;
+pub mod jpeg;
 pub mod nifti;
 pub mod text;
 

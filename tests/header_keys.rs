@@ -132,7 +132,7 @@ fn nifti() {
                 base.set("vox_offset", &[384.0]);
                 changed = base.clone();
                 let plain = data.split_off(4);
-                let with = |first: &[u8]| [first, &vec![0; 28], &plain].concat();
+                let with = |first: &[u8]| [first, &vec![0; 36 - first.len()], &plain].concat();
                 data = with(&[0, 0, 0, 0]);
                 after = with(&[1, 0, 0, 0, 16, 0, 0, 0]);
             }

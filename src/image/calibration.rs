@@ -86,6 +86,7 @@ pub fn unit_named(text: &str) -> Option<String> {
     let text = text.trim().trim_matches(['"', '\'']).trim();
     let short: String = text
         .to_lowercase()
+        .replace('³', "3")
         .chars()
         .filter(|c| c.is_alphanumeric() || *c == '/')
         .collect();

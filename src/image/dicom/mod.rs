@@ -59,21 +59,31 @@
 //! | (7FE0,0009) DoubleFloatPixelData | refused | floating-point pixels |
 //! | (7FE0,0010) PixelData | read | the pixels |
 
+mod coding;
 mod compressed;
 mod elements;
+mod frames;
 mod head;
 mod pixels;
 mod scale;
 mod stack;
+mod walk;
 
 use crate::error::{Error, Result};
 use crate::image::orient::{Affine, from_lps, scaled};
 use crate::image::stored::Stored;
-use head::{ADVICE, Found, Frame, Image, normal};
+use frames::{Frame, normal};
+use head::{Found, Image};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// A volume and how it came about.
+const ADVICE: &str =
+    "convert the series to NIfTI (dcm2niix), or export it again as uncompressed DICOM";
+
+/// Reads the files of a folder, or one file, as one volume.
+///
+/// # Errors
+/// No images, several series, slices that make no stack of boxes, codings that are not read.
 pub fn read(folder: &Path, files: &[PathBuf]) -> Result<Stored> {
     let mut notes = Vec::new();
     let images = images(folder, files, &mut notes)?;
@@ -211,5 +221,5 @@ pub fn is_dicom(path: &Path) -> bool {
     let mut head = Vec::new();
     std::fs::File::open(path)
         .and_then(|file| file.take(132).read_to_end(&mut head))
-        .is_ok_and(|_| head.get(128..132) == Some(b"DICM") || elements::without_preamble(&head))
+        .is_ok_and(|_| head.get(128..132) == Some(b"DICM") || walk::without_preamble(&head))
 }

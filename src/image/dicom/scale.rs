@@ -1,8 +1,8 @@
 //! Owns what stored values of a DICOM frame mean: a line or a table to a unit.
 
+use super::ADVICE;
+use super::coding::{Scale, Table};
 use super::elements::{Set, Tag};
-use super::head::ADVICE;
-use super::pixels::{Scale, Table};
 use crate::error::{Error, Result};
 use crate::image::calibration::unit_named;
 use std::path::Path;

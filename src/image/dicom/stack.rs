@@ -1,6 +1,8 @@
 //! Owns the order and the distance of slices: by their places along the normal, by SliceLocation, or by their numbers.
 
-use super::head::{ADVICE, Frame, Image, dot, normal};
+use super::ADVICE;
+use super::frames::{Frame, dot, normal};
+use super::head::Image;
 use crate::error::{Error, Result};
 use crate::image::orient;
 
@@ -108,8 +110,10 @@ fn even(
         return Ok((mean * 1e7).round() / 1e7);
     }
     if mean > 0.0 && off(mean) <= (0.3 * mean).min(digit_mm) {
-        let told = frames[0].distance_mm.filter(|told| off(*told) <= digit_mm);
-        let distance = told.unwrap_or((mean * 1e5).round() / 1e5);
+        let stated = frames[0]
+            .distance_mm
+            .filter(|stated| off(*stated) <= digit_mm);
+        let distance = stated.unwrap_or((mean * 1e5).round() / 1e5);
         notes.push(format!(
             "positions of slices are rounded to {digit_mm} mm: taken as evenly {distance} mm apart"
         ));

@@ -21,8 +21,8 @@ fn values() -> Vec<f64> {
         .collect()
 }
 
-/// Axes i, j, k of the file in RAS: to the front, to the feet, to the right.
-const AXES: [[f64; 3]; 3] = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]];
+/// Axes i, j, k of the file in RAS: to the front, to the feet, to the left. DICOM's slices follow the normal of i and j.
+const AXES: [[f64; 3]; 3] = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]];
 const SPACING: [f64; 3] = [0.02, 0.03, 0.04];
 
 fn formats() -> Vec<(&'static str, Files)> {
@@ -240,7 +240,7 @@ fn a_crop_is_written_in_the_order_of_the_file_at_its_place() {
             let scan = scan::stored(path).unwrap();
             let out = path.parent().unwrap().join("out");
             let (p, o) = (path.to_str().unwrap(), out.to_str().unwrap());
-            // Along x, y, z: to the right k, to the front i, to the head against j.
+            // Along x, y, z: against k, along i, against j.
             run(&[
                 "segment",
                 p,

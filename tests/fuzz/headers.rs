@@ -196,6 +196,9 @@ fn texts() -> Vec<Sample> {
         ("ElementType", "MET_SHORT"),
         ("ElementDataFile", "LOCAL"),
     ]);
+    let mut list = nrrd("raw");
+    let names = "LIST\nv0.raw\nv1.raw\nv2.raw";
+    list.0.push(("data file".into(), names.into()));
     let hex: String = data.iter().map(|b| format!("{b:02x}")).collect();
     let with = |h: &Header, more: &[u8]| [h.nrrd(), more.to_vec()].concat();
     vec![
@@ -203,9 +206,7 @@ fn texts() -> Vec<Sample> {
         of("hex.nrrd", with(&nrrd("hex"), hex.as_bytes())),
         Sample {
             name: "list.nhdr",
-            bytes: nrrd("raw")
-                .set("data file", "LIST\nv0.raw\nv1.raw\nv2.raw")
-                .nrrd(),
+            bytes: list.nrrd(),
             beside: beside(),
         },
         Sample {

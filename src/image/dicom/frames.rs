@@ -75,6 +75,14 @@ pub fn frames(
         Some(offsets) if offsets.len() == count => offsets,
         _ => Vec::new(),
     };
+    let backwards = set.decimal([0x18, 0x88]).is_some_and(|mm| mm < 0.0);
+    if count > 1 && own.is_empty() && offsets.is_empty() && backwards {
+        return Err(Error::file(
+            path,
+            "has a SpacingBetweenSlices below zero: its frames run against their normal",
+            ADVICE,
+        ));
+    }
     (0..count)
         .map(|index| {
             let groups = Groups {

@@ -14,7 +14,7 @@
 //! | (0008,0016) SOPClassUID | read | CT without a RescaleType is in HU |
 //! | (0008,0060) Modality | read | CT without a RescaleType is in HU |
 //! | (0018,0050) SliceThickness | read | distance of slices where positions and spacing are missing |
-//! | (0018,0088) SpacingBetweenSlices | read | distance of slices where positions are missing |
+//! | (0018,0088) SpacingBetweenSlices | read | distance of slices where positions are missing; below zero it is refused there |
 //! | (0018,1120) GantryDetectorTilt | harmless | positions show a tilt, and are refused by that |
 //! | (0018,1164) ImagerPixelSpacing | harmless | at the detector of a projection, not in the body |
 //! | (0020,000E) SeriesInstanceUID | read | several series are refused |

@@ -153,16 +153,7 @@ pub fn same(first: &Frame, other: &Frame, images: &[Image]) -> Result<()> {
             "keep one series in a folder: sort the files by SeriesInstanceUID",
         );
     }
-    let close = |x: &[f64], y: &[f64], tolerance: f64| {
-        x.iter()
-            .zip(y)
-            .all(|(x, y)| (x - y).abs() <= tolerance * x.abs().max(1e-3))
-    };
-    let same_pixel = match (first.pixel_mm, other.pixel_mm) {
-        (Some(x), Some(y)) => close(&x, &y, 1e-3),
-        (x, y) => x == y,
-    };
-    if !same_pixel {
+    if !same_pixel(first, other) {
         return differs(
             format!(
                 "slice with pixels of {} mm in a series whose first slice has {}",
@@ -196,6 +187,13 @@ pub fn same(first: &Frame, other: &Frame, images: &[Image]) -> Result<()> {
         );
     }
     Ok(())
+}
+
+fn same_pixel(first: &Frame, other: &Frame) -> bool {
+    match (first.pixel_mm, other.pixel_mm) {
+        (Some(a), Some(b)) => (0..2).all(|i| (b[i] / a[i] - 1.0).abs() < 1e-3),
+        (a, b) => a == b,
+    }
 }
 
 fn words(pixel_mm: Option<[f64; 2]>) -> String {

@@ -228,39 +228,22 @@ fn affine(
     path: &Path,
     notes: &mut Vec<String>,
 ) -> Result<Affine> {
-    let numbers = |keys: [&'static str; 3]| -> Result<Option<Vec<f64>>> {
-        let Some(key) = keys.into_iter().find(|key| header.get(key).is_some()) else {
-            return Ok(None);
-        };
-        let found = header
-            .numbers(key)
-            .filter(|m| m.iter().all(|v| v.is_finite()));
-        match found {
-            Some(found) => Ok(Some(found)),
-            None => Err(Error::file(
-                path,
-                format!("{key} holds no finite numbers"),
-                ADVICE,
-            )),
-        }
-    };
-    let matrix = numbers(["TransformMatrix", "Rotation", "Orientation"])?;
-    let offset = numbers(["Offset", "Position", "Origin"])?.unwrap_or_default();
+    let matrix = numbers(header, ["TransformMatrix", "Rotation", "Orientation"], path)?;
+    let offset = numbers(header, ["Offset", "Position", "Origin"], path)?.unwrap_or_default();
     let letters = header.get("AnatomicalOrientation").unwrap_or("RAI");
     if matrix.is_none() && !letters.contains('?') && letters != "RAI" {
         notes.push(format!(
             "AnatomicalOrientation {letters} comes without a TransformMatrix and is not used: axes are taken as left, posterior, superior"
         ));
     }
+    let wrong = |found: String| Err(Error::file(path, found, ADVICE));
     let side = match matrix.as_ref().map_or(9, Vec::len) {
         4 => 2,
         9 => 3,
         16 => 4,
         other => {
-            return Err(Error::file(
-                path,
-                format!("TransformMatrix has {other} numbers, where 4, 9 or 16 are expected"),
-                ADVICE,
+            return wrong(format!(
+                "TransformMatrix has {other} numbers, where 4, 9 or 16 are expected"
             ));
         }
     };
@@ -268,23 +251,33 @@ fn affine(
         Some(m) if axis < side && r < side => m[side * axis + r],
         _ => f64::from(u8::from(axis == r)),
     };
-    let directions = from_lps(std::array::from_fn(|r| {
-        [
-            at(0, r),
-            at(1, r),
-            at(2, r),
-            offset.get(r).copied().unwrap_or(0.0),
-        ]
-    }));
+    let place = |r: usize| offset.get(r).copied().unwrap_or(0.0);
+    let directions: Affine = std::array::from_fn(|r| [at(0, r), at(1, r), at(2, r), place(r)]);
     let norms = column_norms(&directions);
     if norms.iter().any(|l| (l - 1.0).abs() > 1e-3) {
-        return Err(Error::file(
-            path,
-            format!("TransformMatrix should hold unit vectors, theirs have lengths {norms:?}"),
-            ADVICE,
+        return wrong(format!(
+            "TransformMatrix should hold unit vectors, theirs have lengths {norms:?}"
         ));
     }
-    Ok(scaled(&directions, spacing_mm.unwrap_or([1.0; 3])))
+    Ok(scaled(
+        &from_lps(directions),
+        spacing_mm.unwrap_or([1.0; 3]),
+    ))
+}
+
+/// The numbers of the first of `keys` that the header has.
+fn numbers(header: &Header, keys: [&str; 3], path: &Path) -> Result<Option<Vec<f64>>> {
+    let Some(key) = keys.into_iter().find(|key| header.get(key).is_some()) else {
+        return Ok(None);
+    };
+    match header.numbers(key) {
+        Some(found) if found.iter().all(|v| v.is_finite()) => Ok(Some(found)),
+        _ => Err(Error::file(
+            path,
+            format!("{key} holds no finite numbers"),
+            ADVICE,
+        )),
+    }
 }
 
 #[cfg(test)]

@@ -156,14 +156,14 @@ fn other_half(path: &Path, ends: &[&str]) -> PathBuf {
         path.to_path_buf()
     };
     let stem: OsString = name.file_stem().unwrap_or_default().to_os_string();
-    let named = |end: &&str| {
+    let named = |end: &str| {
         let mut file = stem.clone();
         file.push(".");
         file.push(end);
         path.with_file_name(file)
     };
-    let found = ends.iter().map(|end| named(&end)).find(|p| p.is_file());
-    found.unwrap_or_else(|| named(&ends[0]))
+    let found = ends.iter().map(|end| named(end)).find(|p| p.is_file());
+    found.unwrap_or_else(|| named(ends[0]))
 }
 
 fn layout(header: &Header, path: &Path) -> Result<Layout> {

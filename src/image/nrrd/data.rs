@@ -91,35 +91,8 @@ fn part(
     path: &Path,
     start: u64,
 ) -> Result<Vec<f32>> {
-    let lines = skip(header, "lineskip", path)?;
-    let bytes = skip(header, "byteskip", path)?;
-    if lines < 0 || bytes < -1 {
-        return Err(Error::file(
-            path,
-            format!("line skip {lines} and byte skip {bytes} are not read: the least are 0 and -1"),
-            "give the number of lines and bytes before the data",
-        ));
-    }
     let (_, file_bytes) = raw::open_plain(path)?;
-    let mut source = stream(path, encoding, start, lines)?;
-    let leading = match bytes {
-        -1 => {
-            let whole = match encoding {
-                Encoding::Raw => file_bytes,
-                _ => length(&mut *stream(path, encoding, start, lines)?, path)?,
-            };
-            let wanted = layout.sizes().map_or(0, |(_, bytes)| bytes as u64);
-            let from = if encoding == Encoding::Raw {
-                source = stream(path, encoding, 0, 0)?;
-                whole
-            } else {
-                whole
-            };
-            from.saturating_sub(wanted)
-        }
-        bytes => bytes as u64,
-    };
-    raw::skip(&mut *source, leading);
+    let mut source = at_data(header, encoding, layout, path, start)?;
     match encoding {
         Encoding::Text => raw::read_text(&mut *source, layout, path, file_bytes),
         Encoding::Hex => {
@@ -131,6 +104,42 @@ fn part(
         Encoding::Gzip => raw::read(&mut *source, layout, path, file_bytes, true),
         Encoding::Bzip2 => raw::read_expanding(&mut *source, layout, path),
     }
+}
+
+/// The file's stream after what its header skips: lines as they are in the file, then decompressed bytes. A byte skip of -1
+/// goes to the voxels at the end.
+fn at_data(
+    header: &Header,
+    encoding: Encoding,
+    layout: &Layout,
+    path: &Path,
+    start: u64,
+) -> Result<Box<dyn Read>> {
+    let (lines, bytes) = (
+        skip(header, "lineskip", path)?,
+        skip(header, "byteskip", path)?,
+    );
+    let binary = !matches!(encoding, Encoding::Text | Encoding::Hex);
+    let wanted = layout.sizes().map_or(0, |(_, bytes)| bytes as u64);
+    let mut source = stream(path, encoding, start, lines)?;
+    let leading = match bytes {
+        0.. if lines >= 0 => bytes as u64,
+        -1 if lines >= 0 && binary => {
+            let whole = length(&mut *stream(path, encoding, start, lines)?, path)?;
+            whole.saturating_sub(wanted)
+        }
+        _ => {
+            return Err(Error::file(
+                path,
+                format!(
+                    "line skip {lines} and byte skip {bytes} are not read: the least are 0 and, for binary data, -1"
+                ),
+                "give the number of lines and bytes before the data",
+            ));
+        }
+    };
+    raw::skip(&mut *source, leading);
+    Ok(source)
 }
 
 fn skip(header: &Header, key: &str, path: &Path) -> Result<i64> {

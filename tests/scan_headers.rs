@@ -88,6 +88,9 @@ fn a_pair_is_found_by_either_name_in_small_letters_or_capitals() {
         }
         let s = stored(&files).unwrap_or_else(|e| panic!("{asked}: {e}"));
         assert_eq!(s.values, expected(), "{asked}");
+        // In a folder of scans the pair is one.
+        let listed = with(&files, scan::is_scan_file);
+        assert_eq!(listed, asked == header, "{asked}");
     }
     let alone = vec![("gone.img".to_string(), voxels())];
     refused(&alone, &["gone.hdr"]);

@@ -233,9 +233,9 @@ fn without_vms_version(name: &str) -> &str {
     }
 }
 
-/// True for what [`read`] takes as one file (by its name; the content may still be refused).
+/// True for what [`read`] takes as one file (by its name; the content may still be refused). Of a pair it is the header.
 pub fn is_scan_file(path: &Path) -> bool {
-    path.is_file() && kind(path).is_some()
+    path.is_file() && kind(path).is_some() && !nifti::is_image_half(path)
 }
 
 fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {

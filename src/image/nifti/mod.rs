@@ -123,6 +123,11 @@ pub fn data_file(path: &Path) -> Option<PathBuf> {
     pair.then(|| image_of(&header))
 }
 
+/// Whether a file is the `.img` of a pair, by its name.
+pub fn is_image_half(path: &Path) -> bool {
+    ending(path) == Some("img")
+}
+
 /// The `.hdr` that goes with an `.img`; other paths as they are.
 fn header_of(path: &Path) -> PathBuf {
     let ends = ["hdr", "HDR", "hdr.gz", "HDR.GZ", "HDR.gz"];

@@ -3,6 +3,7 @@
 use crate::draw::picture;
 use crate::error::Result;
 use crate::image::calibration::GreyUnit;
+use crate::image::orient::Turn;
 use crate::image::scan;
 use crate::image::scan::Scan;
 use crate::io::atomic;
@@ -56,6 +57,7 @@ pub fn segment(
             voi_blake3,
             format: scan.format.clone(),
             unit: scan.unit.clone(),
+            axes: axes(&scan, params),
             notes: scan.notes.clone(),
         },
         settings: params.clone(),
@@ -139,6 +141,18 @@ fn threshold_in_counts(scan: &Scan, params: &SegmentParams) -> Option<String> {
             "the threshold ({counts}) was taken in the scanner's stored counts: the file holds no calibration to HU. Give it in counts, with --units native, or a file that kept its calibration"
         ),
     })
+}
+
+/// From the file's axes to those of the specimen. A rotated specimen has a grid of its own: it is written as it is.
+fn axes(scan: &Scan, params: &SegmentParams) -> Turn {
+    if params.align.is_some() {
+        return Turn::default();
+    }
+    let to_z = Turn {
+        from: std::array::from_fn(|a| (params.turn.index() + 1 + a) % 3),
+        ..Turn::default()
+    };
+    scan.turn.then(&to_z)
 }
 
 /// The specimen that `segment` left in `dir`.

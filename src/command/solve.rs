@@ -4,7 +4,7 @@ use crate::command::lattice::binned;
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
 use crate::export::{inp, vti, vtk};
-use crate::image::nifti;
+use crate::image::{nifti, orient};
 use crate::io::atomic;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
@@ -309,14 +309,19 @@ fn write_fields(dir: &Path, key: &Settings, recorded: &Recorded) -> Result<()> {
         let name = format!("{}-{}", name(key).replace(' ', "-"), key.lp_mm);
         vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), &name, fields)?;
     }
-    for field in &recorded.fields {
-        let file = format!("field-{}.nii.gz", field.name.replace('_', "-"));
-        nifti::write(&dir.join(file), &field.values)?;
-    }
-    let arrays: Vec<_> = recorded
+    let back = specimen::axes(dir).inverse();
+    let stored: Vec<(&str, Volume<f32>)> = recorded
         .fields
         .iter()
-        .map(|f| (f.name, &f.values))
+        .map(|field| (field.name, orient::turned(field.values.clone(), &back)))
+        .collect();
+    for (name, values) in &stored {
+        let file = format!("field-{}.nii.gz", name.replace('_', "-"));
+        nifti::write(&dir.join(file), values)?;
+    }
+    let arrays: Vec<_> = stored
+        .iter()
+        .map(|(name, values)| (*name, values))
         .collect();
     vti::write(&dir.join("fields.vti"), &arrays)
 }

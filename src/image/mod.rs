@@ -4,6 +4,7 @@ pub mod calibration;
 pub mod dicom;
 pub mod extent;
 pub mod imagej;
+pub mod length;
 pub mod metaimage;
 pub mod nifti;
 pub mod npy;

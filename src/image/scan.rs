@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::image::calibration::{Calibration, GreyUnit};
-use crate::image::orient;
+use crate::image::orient::{self, Turn};
 use crate::image::scanco::{aim, isq};
 use crate::image::stored::Stored;
 use crate::image::{dicom, metaimage, nifti, npy, nrrd, slices, tiff};
@@ -23,6 +23,10 @@ pub struct Scan {
     pub calibration: Option<Calibration>,
     /// Axes x, y, z canonical where the file has an orientation, else as stored. May hold NaN and infinities.
     pub volume: Volume<f32>,
+    /// From the axes as stored to those of `volume`.
+    pub turn: Turn,
+    /// Values from the first to the second stand for no measurement.
+    pub padding: Option<[f32; 2]>,
     pub details: Vec<(String, String)>,
     /// What a user should know of how the file was understood.
     pub notes: Vec<String>,
@@ -35,12 +39,11 @@ pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
 
 /// The same with a Scanco scan's grey values in `unit`; None: as stored.
 pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>) -> Result<Scan> {
+    let spacing_mm = spacing_mm.map(checked_spacing).transpose()?;
     let mut stored = stored(path)?;
     calibrate(&mut stored, unit.unwrap_or(GreyUnit::Native), path)?;
     let mut notes = stored.notes;
-    let found = stored
-        .spacing_mm
-        .filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));
+    let found = stored.spacing_mm;
     let Some(spacing) = found.or(spacing_mm) else {
         return Err(Error::file(
             path,
@@ -51,18 +54,25 @@ pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>
             "give it with --spacing MM (for example --spacing 0.0195)",
         ));
     };
-    let grid = Grid::new(stored.n, spacing);
-    let mut volume = match stored.affine {
-        Some(affine) => orient::canonical(grid, stored.values, affine, &mut notes),
-        None => Volume::from_vec(grid, stored.values),
+    let (mut volume, turn) = match (stored.affine, found) {
+        (Some(affine), Some(spacing)) => {
+            let grid = Grid::new(stored.n, spacing);
+            orient::canonical(grid, stored.values, affine, &mut notes)
+        }
+        (Some(directions), None) => {
+            let back = Turn::of(&directions).unwrap_or_default().inverse();
+            let along = back.from.map(|r| spacing[r]);
+            let grid = Grid::new(stored.n, along);
+            let affine = orient::scaled(&directions, along);
+            orient::canonical(grid, stored.values, affine, &mut notes)
+        }
+        (None, _) => {
+            let grid = Grid::new(stored.n, spacing);
+            (Volume::from_vec(grid, stored.values), Turn::default())
+        }
     };
     if let Some(wanted) = spacing_mm {
-        respace(
-            &mut volume,
-            checked_spacing(wanted)?,
-            found.is_some(),
-            &mut notes,
-        );
+        respace(&mut volume, wanted, found.is_some(), &mut notes);
     }
     Ok(Scan {
         name: name(path),
@@ -71,18 +81,21 @@ pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>
         unit: stored.unit,
         calibration: stored.calibration,
         volume,
+        turn,
+        padding: stored.padding,
         details: stored.details,
         notes,
     })
 }
 
-/// Values with their axes as stored, whatever the orientation says: masks and grey values of a segmented scan, which may
-/// have been turned. `spacing_mm` is the voxel size.
-pub fn read_as_stored(path: &Path, spacing_mm: [f64; 3]) -> Result<Volume<f32>> {
+/// Values of a file that this program wrote on the grid of a scan, brought to the axes that `turn` made of the stored
+/// ones. `spacing_mm` is the voxel size along the turned axes.
+pub fn read_turned(path: &Path, turn: &Turn, spacing_mm: [f64; 3]) -> Result<Volume<f32>> {
     let stored = stored(path)?;
-    let mut volume = Volume::from_vec(Grid::new(stored.n, spacing_mm), stored.values);
+    let grid = Grid::new(stored.n, turn.inverse().from.map(|r| spacing_mm[r]));
+    let mut volume = Volume::from_vec(grid, stored.values);
     volume.affine = stored.affine;
-    Ok(volume)
+    Ok(orient::turned(volume, turn))
 }
 
 /// Files of other formats hold the unit they were saved in: nothing to convert, but a contradiction is an error.
@@ -120,7 +133,25 @@ fn calibrate(stored: &mut Stored, unit: GreyUnit, path: &Path) -> Result<()> {
 }
 
 /// What a file or folder holds, axes as stored.
+///
+/// What changes the meaning of voxels (orientation, shear, units, scale, channels, time, padding, bit order, byte order,
+/// skips, order of frames) is honoured, or refused in words; it is never dropped. Each reader's documentation lists the keys
+/// of its format and says of each whether it is read, refused or harmless.
+///
+/// # Errors
+/// No file, no scan, a damaged one, or one whose voxels are no boxes on one grid.
 pub fn stored(path: &Path) -> Result<Stored> {
+    let mut stored = by_format(path)?;
+    stored.spacing_mm = stored
+        .spacing_mm
+        .filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));
+    if let Some(affine) = &stored.affine {
+        orient::check(path, affine, &mut stored.notes)?;
+    }
+    Ok(stored)
+}
+
+fn by_format(path: &Path) -> Result<Stored> {
     let meta = std::fs::metadata(path).map_err(|e| {
         Error::file(
             path,
@@ -143,7 +174,7 @@ pub fn stored(path: &Path) -> Result<Stored> {
         None => Err(Error::file(
             path,
             "is not a scan format that is read",
-            "give NIfTI, TIFF, MetaImage, NRRD, AIM, ISQ, DICOM or NumPy, or a folder of slices (TIFF, PNG, BMP, DICOM)",
+            "give NIfTI, Analyze, TIFF, MetaImage, NRRD, AIM, ISQ, DICOM or NumPy, or a folder of slices (TIFF, PNG, BMP, DICOM)",
         )),
     }
 }
@@ -161,13 +192,15 @@ enum Kind {
     Dicom,
 }
 
-/// By its name; `;1` is a version that VMS appends.
+/// By its name, DICOM also by its first bytes; `;1` is a version that VMS appends.
 fn kind(path: &Path) -> Option<Kind> {
-    const ENDS: [(&str, Kind); 15] = [
+    const ENDS: [(&str, Kind); 18] = [
         (".nii", Kind::Nifti),
         (".nii.gz", Kind::Nifti),
         (".hdr", Kind::Nifti),
         (".hdr.gz", Kind::Nifti),
+        (".img", Kind::Nifti),
+        (".img.gz", Kind::Nifti),
         (".tif", Kind::Tiff),
         (".tiff", Kind::Tiff),
         (".mha", Kind::MetaImage),
@@ -178,12 +211,14 @@ fn kind(path: &Path) -> Option<Kind> {
         (".aim", Kind::Aim),
         (".isq", Kind::Isq),
         (".dcm", Kind::Dicom),
+        (".dicom", Kind::Dicom),
         (".ima", Kind::Dicom),
     ];
     let name = path.file_name()?.to_string_lossy().to_lowercase();
     let name = without_vms_version(&name);
     ENDS.iter()
         .find_map(|(end, kind)| name.ends_with(end).then_some(*kind))
+        .or_else(|| dicom::is_dicom(path).then_some(Kind::Dicom))
 }
 
 /// `scan.aim;1` without its `;1`.
@@ -198,9 +233,9 @@ fn without_vms_version(name: &str) -> &str {
     }
 }
 
-/// True for what [`read`] takes as one file (by its name; the content may still be refused).
+/// True for what [`read`] takes as one file (by its name; the content may still be refused). Of a pair it is the header.
 pub fn is_scan_file(path: &Path) -> bool {
-    path.is_file() && kind(path).is_some()
+    path.is_file() && kind(path).is_some() && !nifti::is_image_half(path)
 }
 
 fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {
@@ -262,23 +297,25 @@ pub fn hash(path: &Path) -> Result<String> {
             hasher.update(hash_file(&file)?.as_bytes());
         }
     } else {
-        let Some(data) = data_file(path).filter(|data| data.is_file()) else {
+        let data = data_files(path);
+        if data.is_empty() {
             return Ok(hash_file(path)?.to_hex().to_string());
-        };
+        }
         hasher.update(hash_file(path)?.as_bytes());
-        hasher.update(hash_file(&data)?.as_bytes());
+        for file in data.iter().filter(|file| file.is_file()) {
+            hasher.update(hash_file(file)?.as_bytes());
+        }
     }
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// The file of voxels that a header beside it names.
-fn data_file(path: &Path) -> Option<PathBuf> {
-    let name = path.file_name()?.to_string_lossy().to_lowercase();
-    match kind(path)? {
-        Kind::MetaImage if name.ends_with(".mhd") => metaimage::data_file(path),
-        Kind::Nrrd if name.ends_with(".nhdr") => nrrd::data_file(path),
-        Kind::Nifti if name.contains(".hdr") => Some(nifti::image_of(path)),
-        _ => None,
+/// The files of voxels that a header beside them names.
+fn data_files(path: &Path) -> Vec<PathBuf> {
+    match kind(path) {
+        Some(Kind::MetaImage) => metaimage::data_files(path),
+        Some(Kind::Nrrd) => nrrd::data_files(path),
+        Some(Kind::Nifti) => nifti::data_file(path).into_iter().collect(),
+        _ => Vec::new(),
     }
 }
 

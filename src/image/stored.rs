@@ -14,12 +14,14 @@ pub struct Stored {
     pub values: Vec<f32>,
     /// None where the file does not say.
     pub spacing_mm: Option<[f64; 3]>,
-    /// None where the file has no orientation.
+    /// None where the file has no orientation. Where the spacing is unknown its columns are unit vectors.
     pub affine: Option<Affine>,
     /// Unit of the grey values where known: `HU`, `mg HA/cm3`.
     pub unit: Option<String>,
     /// From stored values to HU and density, where the format has its own.
     pub calibration: Option<Calibration>,
+    /// Values from the first to the second stand for no measurement, in the unit of the values.
+    pub padding: Option<[f32; 2]>,
     /// Further facts for `info`, key and value. Never names of persons.
     pub details: Vec<(String, String)>,
     pub notes: Vec<String>,

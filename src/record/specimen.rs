@@ -1,6 +1,7 @@
 //! Owns the segmented scan on disk: `mask.nii.gz` and `segment.json`, written and read back.
 
 use crate::error::{Error, Result};
+use crate::image::orient::{self, Turn};
 use crate::image::{nifti, scan};
 use crate::io::atomic;
 use crate::pipeline::segment::{SegmentParams, SegmentSummary};
@@ -35,14 +36,19 @@ pub struct Input {
     pub format: String,
     /// Unit of the grey values where the file states it.
     pub unit: Option<String>,
+    /// From the file's axes to x, y, z of the results. Mask, grey values and fields are written in the file's order.
+    #[serde(default)]
+    pub axes: Turn,
     pub notes: Vec<String>,
 }
 
 /// Writes mask and record. The record goes last: where it is, the mask is whole.
 pub fn write(dir: &Path, specimen: &Specimen, record: &SegmentRecord) -> Result<()> {
-    nifti::write(&dir.join(MASK), &specimen.bone)?;
+    let back = record.input.axes.inverse();
+    let bone = specimen.bone.clone();
+    nifti::write(&dir.join(MASK), &orient::turned(bone, &back))?;
     match &specimen.grey {
-        Some(grey) => nifti::write(&dir.join(GREY), grey)?,
+        Some(grey) => nifti::write(&dir.join(GREY), &orient::turned(grey.clone(), &back))?,
         None => drop(std::fs::remove_file(dir.join(GREY))),
     }
     let json = serde_json::to_string_pretty(record).expect("records are plain data");
@@ -53,6 +59,11 @@ pub fn write(dir: &Path, specimen: &Specimen, record: &SegmentRecord) -> Result<
 pub fn record(dir: &Path) -> Option<SegmentRecord> {
     let text = std::fs::read_to_string(dir.join(RECORD)).ok()?;
     serde_json::from_str(&text).ok()
+}
+
+/// From the order of the files of voxels in `dir` to x, y, z of the results.
+pub fn axes(dir: &Path) -> Turn {
+    record(dir).map_or(Turn::default(), |record| record.input.axes)
 }
 
 /// The specimen that `segment` left in `dir`.
@@ -69,7 +80,8 @@ pub fn load(dir: &Path) -> Result<Specimen> {
         )
     })?;
     let mask = dir.join(MASK);
-    let stored = scan::read_as_stored(&mask, record.results.spacing_mm)?;
+    let axes = record.input.axes;
+    let stored = scan::read_turned(&mask, &axes, record.results.spacing_mm)?;
     if stored.grid.n != record.results.voxels {
         return Err(Error::file(
             &mask,
@@ -95,7 +107,7 @@ pub fn load_grey(dir: &Path, bone: &Volume<u8>) -> Result<Option<Volume<f32>>> {
     if !path.exists() {
         return Ok(None);
     }
-    let grey = scan::read_as_stored(&path, bone.grid.spacing_mm)?;
+    let grey = scan::read_turned(&path, &axes(dir), bone.grid.spacing_mm)?;
     if grey.grid.n != bone.grid.n {
         return Err(Error::file(
             &path,

@@ -7,6 +7,7 @@ use std::io::{Cursor, Write};
 use tiff::encoder::{Compression as TiffCompression, TiffEncoder, colortype};
 
 /// A file, and what lies beside it undamaged.
+#[derive(Clone)]
 pub struct Sample {
     /// Relative to a folder of its own.
     pub name: &'static str,
@@ -40,6 +41,7 @@ pub fn samples() -> Vec<Sample> {
     all.extend(pictures());
     all.extend(scanco());
     all.push(alone("implicit.dcm", dicom(&le_bytes()[..40], true)));
+    all.extend(super::headers::samples());
     all.extend(tables());
     all
 }

@@ -1,6 +1,6 @@
 """Files written by independent software, read by bonepd-ct: geometry, orientation, units, and a block of bone voxel by voxel of its mask.
 
-    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom tifffile imagecodecs Pillow aimio-py numpy
+    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom pynrrd tifffile imagecodecs Pillow aimio-py numpy
     /tmp/peers/bin/python tests/peers/formats.py target/release/bonepd-ct
 
 A writer that is not installed is skipped with its reason. Exit code 1 if anything differs.
@@ -32,9 +32,10 @@ def ask(*words):
     return json.loads(done.stdout)
 
 
-def check(name, path, world, spacing=SPACING, unit=None, extra=(), grey=None):
+def check(name, path, world, spacing=SPACING, unit=None, extra=(), grey=None, own=None):
     """`world`: the expected mask of the block, canonical axes (z up, y front, x right), from our own mask file; `grey`: all
-    values, whose least, greatest and mean must be told."""
+    values, whose least, greatest and mean must be told; `own`: the mask as stored in the scan (x, y, z) and its affine, which
+    our mask file must have, too."""
     import nibabel
 
     try:
@@ -52,13 +53,29 @@ def check(name, path, world, spacing=SPACING, unit=None, extra=(), grey=None):
             lower = () if "--lower" in extra else ("--lower", 2999.5)
             ask("segment", path, "-o", out, *lower, "--keep-all", *extra)
             mask = nibabel.load(pathlib.Path(out) / "mask.nii.gz")
-            found = np.asarray(mask.dataobj).T
+            stored = np.asarray(mask.dataobj)
+            found = np.asarray(nibabel.as_closest_canonical(mask).dataobj).T
+        if own is not None:
+            assert (stored == own[0]).all(), "the mask is not in the order of the scan"
+            assert np.allclose(mask.affine, own[1], atol=1e-5), (mask.affine, own[1])
         assert found.shape == world.shape, (found.shape, world.shape)
         assert (found != world).sum() == 0, f"{(found != world).sum()} voxels differ"
         print(f"ok       {name}")
     except Exception as e:
         FAILED.append(name)
         print(f"FAILED   {name}: {e}")
+
+
+def refuse(name, path, *words):
+    """Our refusal of what has no right value, in words that name it."""
+    try:
+        ask("info", path)
+        said = "it was read"
+    except RuntimeError as e:
+        said = str(e)
+    good = all(word in said for word in words)
+    print(f"{'ok      ' if good else 'FAILED  '} {name}: refused{'' if good else ' in other words: ' + said}")
+    FAILED.extend([] if good else [name])
 
 
 def needs(module):
@@ -106,8 +123,35 @@ def nibabel_files(dir):
         turn = nib.orientations.ornt_transform(
             nib.orientations.axcodes2ornt("RAS"), nib.orientations.axcodes2ornt(tuple(codes))
         )
-        nib.save(image.as_reoriented(turn), dir / f"{codes}.nii.gz")
-        check(f"nibabel stored as {codes}", dir / f"{codes}.nii.gz", expected)
+        turned = image.as_reoriented(turn)
+        nib.save(turned, dir / f"{codes}.nii.gz")
+        own = (np.asarray(turned.dataobj) > 2999.5, turned.affine)
+        check(f"nibabel stored as {codes}", dir / f"{codes}.nii.gz", expected, own=own)
+    for endian in "<>":
+        two = nib.Nifti2Image(data, np.diag([*SPACING, 1.0]), header=nib.Nifti2Header(endianness=endian))
+        two.header.set_xyzt_units("mm")
+        path = dir / f"two{ord(endian)}.nii.gz"
+        nib.save(two, path)
+        check(f"nibabel NIfTI-2 {'little' if endian == '<' else 'big'}-endian", path, expected, own=(data > 2999.5, two.affine))
+    two = nib.Nifti2Pair(data, np.diag([*SPACING, 1.0]))
+    two.header.set_xyzt_units("mm")
+    nib.save(two, dir / "a.b.img")
+    check("nibabel NIfTI-2 pair, given by its image", dir / "a.b.img", expected)
+    # Analyze: its axes are as stored here, which the note says; nibabel mirrors x.
+    for kind in (nib.AnalyzeImage, nib.Spm99AnalyzeImage):
+        old = kind(data, np.diag([*SPACING, 1.0]))
+        path = dir / f"{kind.__name__}.img"
+        nib.save(old, path)
+        assert (np.asarray(nib.load(path).dataobj) == data).all()
+        check(f"nibabel {kind.__name__}", path, expected, grey=GREY)
+    damaged = bytearray((dir / "LPS.nii.gz").read_bytes())
+    damaged[-6] ^= 1
+    (dir / "crc.nii.gz").write_bytes(damaged)
+    refuse("gzip with a wrong checksum", dir / "crc.nii.gz", "checksum")
+    sheared = np.diag([*SPACING, 1.0])
+    sheared[0, 2] = 0.01
+    nib.save(nib.Nifti1Image(data, sheared), dir / "sheared.nii")
+    refuse("nibabel sheared", dir / "sheared.nii", "sheared", "11.31")
 
 
 def simpleitk_files(dir):
@@ -125,7 +169,79 @@ def simpleitk_files(dir):
     for name in ("turned.mha", "turned.nrrd", "turned.nii.gz"):
         sitk.WriteImage(image, str(dir / name))
         ras = sitk.DICOMOrient(image, "RAS")
-        check(f"SimpleITK {name}", dir / name, (sitk.GetArrayFromImage(ras) > 2999.5).astype(np.uint8), ras.GetSpacing())
+        own = (GREY.T > 2999.5, itk_affine(image))
+        check(f"SimpleITK {name}", dir / name, (sitk.GetArrayFromImage(ras) > 2999.5).astype(np.uint8), ras.GetSpacing(), own=own)
+    image.SetDirection((1, 0, 0, 0, 1, 0, 0, 0, 1))
+    image.SetOrigin((1.5, -2.5, 7.0))
+    thin = sitk.JoinSeries([image])
+    sitk.WriteImage(thin, str(dir / "four.mha"))
+    check("SimpleITK four dimensions", dir / "four.mha", world, own=(GREY.T > 2999.5, itk_affine(image)))
+    # MetaImages that SimpleITK reads and does not write: slices in files of their own, skips, text, scales of its own.
+    for k, page in enumerate(GREY):
+        (dir / f"s{k:03d}.raw").write_bytes(b"sixteen bytes!!!" + page.tobytes())
+    head = f"ObjectType = Image\nNDims = 3\nDimSize = 7 8 9\nElementSpacing = {SPACING[0]} {SPACING[1]} {SPACING[2]}\nElementType = MET_SHORT\n"
+    names = "\n".join(f"s{k:03d}.raw" for k in range(9))
+    for name, rest in {
+        "list": f"HeaderSize = 16\nElementDataFile = LIST\n{names}\n",
+        "list2d": f"HeaderSize = -1\nElementDataFile = LIST 2D\n{names}\n",
+        "pattern": "HeaderSize = 16\nElementDataFile = s%03d.raw 0 8 1\n",
+        "text": "BinaryData = False\nElementDataFile = LOCAL\n" + " ".join(map(str, GREY.ravel())) + "\n",
+    }.items():
+        path = dir / f"{name}.mhd"
+        path.write_text(head + rest)
+        theirs = sitk.GetArrayFromImage(sitk.ReadImage(str(path)))
+        assert (theirs == GREY).all(), f"SimpleITK reads {name} differently"
+        check(f"MetaImage {name}, as SimpleITK reads it", path, world, grey=GREY)
+
+
+def itk_affine(image):
+    """Of voxel indices to RAS."""
+    affine = np.eye(4)
+    affine[:3, :3] = np.reshape(image.GetDirection(), (3, 3)) * image.GetSpacing()
+    affine[:3, 3] = image.GetOrigin()
+    return np.diag([-1, -1, 1, 1]) @ affine
+
+
+def pynrrd_files(dir):
+    nrrd = needs("nrrd")
+    if not nrrd:
+        return
+    world = (GREY > 2999.5).astype(np.uint8)
+    for encoding in ("raw", "gzip", "bzip2", "ascii"):
+        for name in ("a.nrrd", "a.nhdr"):
+            path = dir / f"{encoding}-{name}"
+            header = {"encoding": encoding, "spacings": SPACING, "units": ["mm"] * 3, "endian": "little"}
+            nrrd.write(str(path), GREY.T, header)
+            check(f"pynrrd {encoding} {name[2:]}", path, world, grey=GREY)
+    directions = np.array([[0, 20, 0], [0, 0, -30], [50, 0, 0]])
+    header = {"space": "left-anterior-superior", "space directions": directions, "space origin": [1, 2, 3], "space units": ["um"] * 3}
+    path = dir / "turned.nrrd"
+    nrrd.write(str(path), GREY.T, header)
+    affine = np.eye(4)
+    affine[:3, :3], affine[:3, 3] = directions.T / 1000, [0.001, 0.002, 0.003]
+    affine = np.diag([-1, 1, 1, 1]) @ affine
+    turned = GREY.transpose(1, 2, 0)[::-1, :, ::-1] > 2999.5
+    check("pynrrd micrometres, turned", path, turned.astype(np.uint8), (0.05, 0.02, 0.03), own=(GREY.T > 2999.5, affine))
+    sitk = needs("SimpleITK")
+    if not sitk:
+        return
+    # What SimpleITK reads and neither writes: skips and slices in files of their own.
+    head = "NRRD0005\ntype: short\ndimension: 3\nsizes: 7 8 9\nspacings: 0.02 0.03 0.05\nendian: little\n"
+    (dir / "lines.raw").write_bytes(b"one\ntwo\n123" + GREY.tobytes())
+    for k, page in enumerate(GREY):
+        (dir / f"n{k}.raw").write_bytes(page.tobytes())
+    names = "\n".join(f"n{k}.raw" for k in range(9))
+    for name, rest in {
+        "skips": "encoding: raw\nlineskip: 2\nbyteskip: 3\ndata file: lines.raw\n",
+        "end": "encoding: raw\nbyte skip: -1\ndata file: lines.raw\n",
+        "list": f"encoding: raw\ndata file: LIST\n{names}\n",
+        "pattern": "encoding: raw\ndatafile: n%d.raw 0 8 1\n",
+    }.items():
+        path = dir / f"{name}.nhdr"
+        path.write_text(head + rest)
+        theirs = sitk.GetArrayFromImage(sitk.ReadImage(str(path)))
+        assert (theirs == GREY).all(), f"SimpleITK reads {name} differently"
+        check(f"NRRD {name}, as SimpleITK reads it", path, world, grey=GREY)
 
 
 def pydicom_files(dir):
@@ -162,6 +278,108 @@ def pydicom_files(dir):
         world = (GREY * 2.0 - 1000 > 2999.5).astype(np.uint8)[:, ::-1, ::-1]
         check(f"pydicom series, {name}", folder, world, unit="HU")
         assert "Jane" not in json.dumps(ask("info", folder)), "a patient's name got out"
+    pydicom_kinds(dir, pydicom)
+
+
+def pydicom_kinds(dir, pydicom):
+    """The last series above in other codings, each file changed by pydicom and read back by it."""
+    from pydicom.uid import DeflatedExplicitVRLittleEndian, RLELossless
+
+    source = sorted((dir / "dicom_explicit").iterdir())
+    world = (GREY * 2.0 - 1000 > 2999.5).astype(np.uint8)[:, ::-1, ::-1]
+    first = pydicom.dcmread(source[0])
+    origin = np.diag([-SPACING[0], -SPACING[1], SPACING[2], 1.0])
+    origin[:3, 3] = [-1.0, -2.0, 0.0]
+    own = ((GREY * 2.0 - 1000 > 2999.5).T, origin)
+
+    def series(name, change, save=None, unit="HU"):
+        folder = dir / name
+        folder.mkdir()
+        for path in source:
+            ds = pydicom.dcmread(path)
+            change(ds)
+            if save:
+                save(ds, folder / path.name)
+            else:
+                ds.save_as(folder / path.name, enforce_file_format=True)
+            back = pydicom.dcmread(folder / path.name, force=True)
+            if hasattr(back.file_meta, "TransferSyntaxUID"):
+                assert (back.pixel_array == pydicom.dcmread(path).pixel_array).all(), name
+        check(f"pydicom {name}", folder, world, unit=unit, own=own)
+
+    def syntax(uid):
+        def change(ds):
+            ds.file_meta.TransferSyntaxUID = uid
+        return change
+
+    def sequence(ds):
+        inner = pydicom.Dataset()
+        inner.ScheduledProcedureStepDescription = "made"
+        ds.RequestAttributesSequence = [inner]
+        ds["RequestAttributesSequence"].is_undefined_length = True
+
+    series("RLE", lambda ds: ds.compress(RLELossless))
+    series("deflated", syntax(DeflatedExplicitVRLittleEndian))
+    series("sequence of undefined length", sequence)
+    bare = lambda ds, path: pydicom.dcmwrite(path, pydicom.Dataset({e.tag: e for e in ds}), implicit_vr=True, little_endian=True)
+    series("without preamble and meta information", lambda ds: None, save=bare)
+    series("MONOCHROME1", lambda ds: setattr(ds, "PhotometricInterpretation", "MONOCHROME1"))
+
+    def density(ds):
+        ds.RescaleType = "mgHA/ccm"
+
+    series("rescaled to density", density, unit="mg HA/cm3")
+    enhanced(dir, pydicom, first, own, world)
+    tilted = dir / "tilted"
+    tilted.mkdir()
+    for path in source:
+        ds = pydicom.dcmread(path)
+        x, y, z = ds.ImagePositionPatient
+        ds.ImagePositionPatient = [x, y + 0.5 * z, z]
+        ds.save_as(tilted / path.name, enforce_file_format=True)
+    refuse("pydicom tilted gantry", tilted, "sheared", "26.57")
+    for uid, name in (("JPEGLSLossless", "JPEG-LS"), ("JPEG2000Lossless", "JPEG 2000")):
+        path = dir / f"{uid}.dcm"
+        ds = pydicom.dcmread(source[0])
+        try:
+            ds.compress(getattr(pydicom.uid, uid))
+        except Exception as e:
+            print(f"skipped  pydicom {name}: {e}")
+            continue
+        ds.save_as(path, enforce_file_format=True)
+        refuse(f"pydicom {name}", path, name, "gdcmconv --raw")
+
+
+def enhanced(dir, pydicom, first, own, world):
+    """All slices in one file, frames in another order than along the normal, place and scale in functional groups."""
+    from pydicom.dataset import Dataset
+    from pydicom.uid import EnhancedCTImageStorage
+
+    ds = first
+    order = list(rng.permutation(len(GREY)))
+    ds.SOPClassUID = ds.file_meta.MediaStorageSOPClassUID = EnhancedCTImageStorage
+    ds.NumberOfFrames = len(order)
+
+    def group(name, **values):
+        inner, outer = Dataset(), Dataset()
+        for key, value in values.items():
+            setattr(inner, key, value)
+        setattr(outer, name, [inner])
+        return outer
+
+    shared = group("PixelMeasuresSequence", PixelSpacing=[SPACING[1], SPACING[0]], SliceThickness=9.0)
+    shared.update(group("PlaneOrientationSequence", ImageOrientationPatient=[1, 0, 0, 0, 1, 0]))
+    shared.update(group("PixelValueTransformationSequence", RescaleSlope=2, RescaleIntercept=-1000, RescaleType="HU"))
+    ds.SharedFunctionalGroupsSequence = [shared]
+    ds.PerFrameFunctionalGroupsSequence = [
+        group("PlanePositionSequence", ImagePositionPatient=[1.0, 2.0, float(k) * SPACING[2]]) for k in order
+    ]
+    for key in ("PixelSpacing", "SliceThickness", "ImagePositionPatient", "ImageOrientationPatient", "RescaleSlope", "RescaleIntercept"):
+        delattr(ds, key)
+    ds.PixelData = GREY[order].tobytes()
+    path = dir / "enhanced"
+    ds.save_as(path, enforce_file_format=True)
+    check("pydicom enhanced, frames shuffled", path, world, unit="HU", own=own)
 
 
 def tifffile_files(dir):
@@ -336,7 +554,7 @@ def main():
     if not needs("nibabel"):
         print("nothing can be checked without nibabel, which reads our masks")
         return 0
-    for group in (nibabel_files, simpleitk_files, pydicom_files, tifffile_files, numpy_files, pillow_files, aim_files):
+    for group in (nibabel_files, simpleitk_files, pynrrd_files, pydicom_files, tifffile_files, numpy_files, pillow_files, aim_files):
         with tempfile.TemporaryDirectory() as dir:
             try:
                 group(pathlib.Path(dir))

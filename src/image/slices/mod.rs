@@ -90,17 +90,13 @@ fn kind(path: &Path) -> Option<&'static str> {
         ("png", ".png"),
         ("bmp", ".bmp"),
         ("dcm", ".dcm"),
+        ("dcm", ".dicom"),
         ("dcm", ".ima"),
     ];
     let found = by_name
         .into_iter()
         .find_map(|(kind, end)| name.ends_with(end).then_some(kind));
-    let unnamed = !name.contains('.')
-        || name
-            .rsplit('.')
-            .next()
-            .is_some_and(|e| e.bytes().all(|c| c.is_ascii_digit()));
-    found.or_else(|| (unnamed && dicom::is_dicom(path)).then_some("dcm"))
+    found.or_else(|| dicom::is_dicom(path).then_some("dcm"))
 }
 
 /// Order of names in which runs of digits compare as numbers.

@@ -2,10 +2,12 @@
 //!
 //! Sizes in headers are not believed: what a file cannot hold is refused before memory is taken.
 
+pub mod pattern;
+
 use crate::error::{Error, Result};
-use flate2::read::MultiGzDecoder;
+use flate2::bufread::GzDecoder;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 /// How one voxel is stored.
@@ -51,8 +53,11 @@ impl Scalar {
 
 pub type Source = Box<dyn Read>;
 
-/// A file as a stream, its size on disk, and whether it was compressed (gzip, by its first bytes, unpacked here).
-pub fn open(path: &Path) -> Result<(Source, u64, bool)> {
+/// The first bytes of any gzip stream.
+pub const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// A file's bytes as they are, and their number.
+pub fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
     let unreadable = |e: std::io::Error| {
         Error::file(
             path,
@@ -60,25 +65,48 @@ pub fn open(path: &Path) -> Result<(Source, u64, bool)> {
             "check the path and its permissions",
         )
     };
-    let mut file = File::open(path).map_err(unreadable)?;
+    let file = File::open(path).map_err(unreadable)?;
     let file_bytes = file.metadata().map_err(unreadable)?.len();
-    let mut magic = Vec::new();
-    Read::by_ref(&mut file)
-        .take(2)
-        .read_to_end(&mut magic)
-        .map_err(unreadable)?;
-    let compressed = magic == GZIP;
-    let start = BufReader::with_capacity(1 << 18, std::io::Cursor::new(magic).chain(file));
+    Ok((BufReader::with_capacity(1 << 18, file), file_bytes))
+}
+
+/// A file as a stream, its size on disk, and whether it was compressed (gzip, by its first bytes, decompressed here).
+pub fn open(path: &Path) -> Result<(Source, u64, bool)> {
+    let (mut file, file_bytes) = open_plain(path)?;
+    let compressed = file.fill_buf().is_ok_and(|start| start.starts_with(&GZIP));
     let source: Source = if compressed {
-        Box::new(MultiGzDecoder::new(start))
+        Box::new(gunzip(file))
     } else {
-        Box::new(start)
+        Box::new(file)
     };
     Ok((source, file_bytes, compressed))
 }
 
-/// The first bytes of any gzip stream.
-pub const GZIP: [u8; 2] = [0x1f, 0x8b];
+/// The content of a gzip stream. Read to its end, every member is held to its checksum.
+pub fn gunzip<R: BufRead>(compressed: R) -> impl Read {
+    Members(Some(GzDecoder::new(compressed)))
+}
+
+/// One member after another. Bytes after the last that begin no member are passed over, as gzip itself does.
+struct Members<R>(Option<GzDecoder<R>>);
+
+impl<R: BufRead> Read for Members<R> {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        while let Some(member) = &mut self.0 {
+            let got = member.read(out)?;
+            if got > 0 || out.is_empty() {
+                return Ok(got);
+            }
+            let mut rest = self.0.take().map(GzDecoder::into_inner);
+            if let Some(next) = &mut rest
+                && next.fill_buf()?.starts_with(&GZIP[..1])
+            {
+                self.0 = rest.map(GzDecoder::new);
+            }
+        }
+        Ok(0)
+    }
+}
 
 /// Passes over `bytes`; where the stream ends before, the voxels are found missing.
 pub fn skip(source: &mut dyn Read, bytes: u64) {
@@ -120,6 +148,18 @@ impl Layout {
     }
 }
 
+/// The part of `layout` that each of `files` files holds, cut along the slowest axis; None where they cannot share it evenly.
+pub fn slab(layout: &Layout, files: usize) -> Option<Layout> {
+    let [nx, ny, nz] = layout.n;
+    if files == 0 || nz % files != 0 {
+        return None;
+    }
+    Some(Layout {
+        n: [nx, ny, nz / files],
+        ..*layout
+    })
+}
+
 /// The most that deflate can expand (1032), rounded up. A header that asks for more than this many times its file's
 /// size is lying.
 pub const MAX_EXPANSION: u64 = 1100;
@@ -156,6 +196,36 @@ pub fn read(
             "use a machine with more memory, or cut the scan first",
         )
     })?;
+    take(source, layout, path, bytes, &mut values)?;
+    if compressed {
+        check_end(source, path)?;
+    }
+    Ok(values)
+}
+
+/// The same from a compression that may expand a file to any size (bzip2): memory is taken as voxels come.
+pub fn read_expanding(source: &mut dyn Read, layout: &Layout, path: &Path) -> Result<Vec<f32>> {
+    let Some((_, bytes)) = layout.sizes().filter(|(voxels, _)| *voxels > 0) else {
+        return Err(Error::file(
+            path,
+            format!("promises {:?} voxels", layout.n),
+            "the file is damaged: copy or export it again",
+        ));
+    };
+    let mut values = Vec::new();
+    take(source, layout, path, bytes, &mut values)?;
+    check_end(source, path)?;
+    Ok(values)
+}
+
+/// The next `bytes` of `source` as voxels.
+fn take(
+    source: &mut dyn Read,
+    layout: &Layout,
+    path: &Path,
+    bytes: usize,
+    values: &mut Vec<f32>,
+) -> Result<()> {
     let mut chunk = vec![0u8; (1 << 20).min(bytes)];
     let mut left = bytes;
     while left > 0 {
@@ -170,10 +240,60 @@ pub fn read(
                 "the file is truncated or damaged: copy or export it again",
             ));
         }
-        decode(&chunk[..part], layout, &mut values);
+        decode(&chunk[..part], layout, values);
         left -= part;
     }
-    Ok(values)
+    Ok(())
+}
+
+/// Reads a compressed stream to its end, where its checksum is.
+fn check_end(source: &mut dyn Read, path: &Path) -> Result<()> {
+    match std::io::copy(source, &mut std::io::sink()) {
+        Ok(_) => Ok(()),
+        Err(e) => Err(Error::file(
+            path,
+            format!("its voxels were decompressed, but the stream is damaged: {e}"),
+            "some voxels may be wrong: copy or download the file again (`gzip -t` tells whether a .gz file is whole)",
+        )),
+    }
+}
+
+/// Voxels written as numbers, separated by white space or commas.
+pub fn read_text(
+    source: &mut dyn Read,
+    layout: &Layout,
+    path: &Path,
+    file_bytes: u64,
+) -> Result<Vec<f32>> {
+    let advice = "save it with binary voxels";
+    let mut text = String::new();
+    source
+        .take(file_bytes)
+        .read_to_string(&mut text)
+        .map_err(|e| Error::file(path, format!("its voxels are no text: {e}"), advice))?;
+    let words = text.split(|c: char| c.is_whitespace() || c == ',');
+    let numbers: Option<Vec<f64>> = words
+        .filter(|word| !word.is_empty())
+        .map(|word| word.parse().ok())
+        .collect();
+    let expected = layout.sizes().map_or(0, |(voxels, _)| voxels);
+    match numbers {
+        Some(numbers) if numbers.len() == expected && expected > 0 => Ok(numbers
+            .into_iter()
+            .map(|v| (layout.slope * v + layout.intercept) as f32)
+            .collect()),
+        found => Err(Error::file(
+            path,
+            match found {
+                Some(numbers) => format!(
+                    "holds {} numbers where the header promises {expected}",
+                    numbers.len()
+                ),
+                None => "holds words among the numbers that are its voxels".into(),
+            },
+            advice,
+        )),
+    }
 }
 
 /// Fills `chunk` as far as `source` goes: how many bytes came, and what broke it off, if it did not just end.
@@ -271,5 +391,29 @@ mod tests {
         let l = layout(Scalar::U8, false, [10, 10, 10]);
         let e = read(&mut &[0u8; 999][..], &l, Path::new("t"), 1000, false).unwrap_err();
         assert!(e.to_string().contains("after 999 of 1000 bytes"), "{e}");
+    }
+
+    #[test]
+    fn a_gzip_stream_is_held_to_its_checksum_and_may_have_members_and_padding() {
+        use std::io::Write;
+        let member = |bytes: &[u8]| {
+            let mut gz = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+            gz.write_all(bytes).unwrap();
+            gz.finish().unwrap()
+        };
+        let l = layout(Scalar::U8, false, [6, 1, 1]);
+        let of = |bytes: &[u8]| {
+            let mut source = gunzip(bytes);
+            read(&mut source, &l, Path::new("x.gz"), 100, true)
+        };
+        let two = [member(&[1, 2, 3, 4]), member(&[5, 6, 7])].concat();
+        let expected = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        assert_eq!(of(&two).unwrap(), expected);
+        assert_eq!(of(&[two.clone(), vec![0; 9]].concat()).unwrap(), expected);
+        let mut wrong = two.clone();
+        let checksum = two.len() - 8;
+        wrong[checksum] ^= 1;
+        assert!(of(&wrong).unwrap_err().to_string().contains("checksum"));
+        assert!(of(&two[..two.len() - 3]).is_err(), "the trailer is cut");
     }
 }

@@ -9,6 +9,7 @@ mod fields;
 mod formats;
 mod fuzz;
 mod info;
+mod inputs;
 mod laws;
 mod layers;
 mod made;

@@ -70,6 +70,8 @@ pub fn read_archive(path: &Path) -> Result<Stored> {
     let mut entry = archive.by_index(*index).map_err(damaged)?;
     let bytes = entry.compressed_size();
     let mut stored = array(&mut entry, path, bytes, true)?;
+    // The checksum stands at the end.
+    std::io::copy(&mut entry, &mut std::io::sink()).map_err(|e| damaged(e.into()))?;
     stored.format = format!("{} `{name}` of .npz", stored.format);
     Ok(stored)
 }

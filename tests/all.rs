@@ -13,6 +13,7 @@ mod fuzz;
 mod header_keys;
 mod header_property;
 mod info;
+mod inputs;
 mod laws;
 mod layers;
 mod molecular;

@@ -46,7 +46,7 @@ struct Found {
 fn take(target: &Path, spacing_mm: Option<[f64; 3]>) -> bool {
     let name = target.file_name().unwrap().to_str().unwrap();
     match name {
-        "manifest.csv" => {
+        "manifest.csv" | "manifest.tsv" => {
             let session = Session {
                 quiet: true,
                 ..Session::default()
@@ -233,7 +233,7 @@ fn a_million_damaged_files() {
 fn files_under_a_wrong_name_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let samples = samples();
-    let single = |s: &&Sample| s.beside.is_empty() && !s.name.ends_with(".csv");
+    let single = |s: &&Sample| s.beside.is_empty() && !s.name.ends_with("sv");
     for (a, b) in samples.iter().filter(single).flat_map(|a| {
         let others = samples.iter().filter(single);
         others.map(move |b| (a, b))

@@ -50,7 +50,8 @@ pub fn is_stack(path: &Path) -> bool {
 /// Width, height, and pages of a TIFF file; an ImageJ stack of one directory tells its pages in its description.
 fn pages(path: &Path) -> Option<[usize; 3]> {
     let mut file = File::open(path).ok()?;
-    if directories::fault(&file).is_some() {
+    let bytes = file.metadata().ok()?.len();
+    if directories::fault(&mut file, bytes).is_some() {
         return None;
     }
     file.rewind().ok()?;

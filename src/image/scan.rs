@@ -2,11 +2,13 @@
 
 use crate::error::{Error, Result};
 use crate::grid::Grid;
+use crate::image::array::headerless::{self, Contents};
+use crate::image::array::npy;
 use crate::image::calibration::{Calibration, GreyUnit};
-use crate::image::orient::{self, Turn};
+use crate::image::orient::{self, Affine, Turn};
 use crate::image::scanco::{aim, isq};
 use crate::image::stored::Stored;
-use crate::image::{dicom, metaimage, nifti, npy, nrrd, slices, tiff};
+use crate::image::{dicom, metaimage, nifti, nrrd, slices, tiff};
 use crate::volume::Volume;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -27,21 +29,40 @@ pub struct Scan {
     pub turn: Turn,
     /// Values from the first to the second stand for no measurement.
     pub padding: Option<[f32; 2]>,
+    /// What the file says of voxel size and place, along the axes of `volume`, whatever voxel size was asked for.
+    pub file_spacing_mm: Option<[f64; 3]>,
+    pub file_affine: Option<Affine>,
     pub details: Vec<(String, String)>,
     /// What a user should know of how the file was understood.
     pub notes: Vec<String>,
 }
 
-/// Reads a scan in its own units. `spacing_mm` (x, y, z of the canonical axes) overrides the file's voxel size.
-pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
-    read_in(path, spacing_mm, None)
+/// How a scan is to be read.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reading {
+    /// Voxel size along x, y, z of the canonical axes; wins over the file's.
+    pub spacing_mm: Option<[f64; 3]>,
+    /// Of a Scanco scan's grey values; None: as stored.
+    pub unit: Option<GreyUnit>,
+    /// What is in a file without a header.
+    pub raw: Option<Contents>,
 }
 
-/// The same with a Scanco scan's grey values in `unit`; None: as stored.
-pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>) -> Result<Scan> {
-    let spacing_mm = spacing_mm.map(checked_spacing).transpose()?;
-    let mut stored = stored(path)?;
-    calibrate(&mut stored, unit.unwrap_or(GreyUnit::Native), path)?;
+/// Reads a scan in its own units. `spacing_mm` (x, y, z of the canonical axes) overrides the file's voxel size.
+pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
+    read_as(
+        path,
+        &Reading {
+            spacing_mm,
+            ..Reading::default()
+        },
+    )
+}
+
+pub fn read_as(path: &Path, reading: &Reading) -> Result<Scan> {
+    let spacing_mm = reading.spacing_mm.map(checked_spacing).transpose()?;
+    let mut stored = stored_as(path, reading.raw)?;
+    calibrate(&mut stored, reading.unit.unwrap_or(GreyUnit::Native), path)?;
     let mut notes = stored.notes;
     let found = stored.spacing_mm;
     let Some(spacing) = found.or(spacing_mm) else {
@@ -71,6 +92,8 @@ pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>
             (Volume::from_vec(grid, stored.values), Turn::default())
         }
     };
+    let file_affine = volume.affine;
+    let file_spacing_mm = found.map(|_| volume.grid.spacing_mm);
     if let Some(wanted) = spacing_mm {
         respace(&mut volume, wanted, found.is_some(), &mut notes);
     }
@@ -83,6 +106,8 @@ pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>
         volume,
         turn,
         padding: stored.padding,
+        file_spacing_mm,
+        file_affine,
         details: stored.details,
         notes,
     })
@@ -141,17 +166,33 @@ fn calibrate(stored: &mut Stored, unit: GreyUnit, path: &Path) -> Result<()> {
 /// # Errors
 /// No file, no scan, a damaged one, or one whose voxels are no boxes on one grid.
 pub fn stored(path: &Path) -> Result<Stored> {
-    let mut stored = by_format(path)?;
+    stored_as(path, None)
+}
+
+/// The same; `raw` is what is in a file without a header.
+pub fn stored_as(path: &Path, raw: Option<Contents>) -> Result<Stored> {
+    let mut stored = by_format(path, raw)?;
     stored.spacing_mm = stored
         .spacing_mm
         .filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));
     if let Some(affine) = &stored.affine {
         orient::check(path, affine, &mut stored.notes)?;
     }
+    if stored.format.contains("int32") || stored.format.contains("int64") {
+        let rounded = |v: &f32| v.abs() >= MOST_INTEGER;
+        if stored.values.par_iter().any(rounded) {
+            stored.notes.push(format!(
+                "integers from {MOST_INTEGER} on are rounded: values are kept in single precision"
+            ));
+        }
+    }
     Ok(stored)
 }
 
-fn by_format(path: &Path) -> Result<Stored> {
+/// From here on single precision does not hold every integer.
+const MOST_INTEGER: f32 = 16_777_216.0;
+
+fn by_format(path: &Path, raw: Option<Contents>) -> Result<Stored> {
     let meta = std::fs::metadata(path).map_err(|e| {
         Error::file(
             path,
@@ -168,6 +209,11 @@ fn by_format(path: &Path) -> Result<Stored> {
         Some(Kind::MetaImage) => metaimage::read(path),
         Some(Kind::Nrrd) => nrrd::read(path),
         Some(Kind::Npy) => npy::read(path),
+        Some(Kind::Npz) => npy::read_archive(path),
+        Some(Kind::Headerless) => match raw {
+            Some(contents) => headerless::read(path, contents),
+            None => Err(headerless::unknown(path)),
+        },
         Some(Kind::Aim) => aim::read(path),
         Some(Kind::Isq) => isq::read(path),
         Some(Kind::Dicom) => dicom::read(path, &[path.to_path_buf()]),
@@ -187,6 +233,8 @@ enum Kind {
     MetaImage,
     Nrrd,
     Npy,
+    Npz,
+    Headerless,
     Aim,
     Isq,
     Dicom,
@@ -194,7 +242,7 @@ enum Kind {
 
 /// By its name, DICOM also by its first bytes; `;1` is a version that VMS appends.
 fn kind(path: &Path) -> Option<Kind> {
-    const ENDS: [(&str, Kind); 18] = [
+    const ENDS: [(&str, Kind); 21] = [
         (".nii", Kind::Nifti),
         (".nii.gz", Kind::Nifti),
         (".hdr", Kind::Nifti),
@@ -208,6 +256,9 @@ fn kind(path: &Path) -> Option<Kind> {
         (".nrrd", Kind::Nrrd),
         (".nhdr", Kind::Nrrd),
         (".npy", Kind::Npy),
+        (".npz", Kind::Npz),
+        (".raw", Kind::Headerless),
+        (".vol", Kind::Headerless),
         (".aim", Kind::Aim),
         (".isq", Kind::Isq),
         (".dcm", Kind::Dicom),
@@ -233,9 +284,12 @@ fn without_vms_version(name: &str) -> &str {
     }
 }
 
-/// True for what [`read`] takes as one file (by its name; the content may still be refused). Of a pair it is the header.
+/// True for what [`read`] takes as one file (by its name; the content may still be refused). Of a pair it is the header. Voxels
+/// without a header are none: most lie beside the header of another format.
 pub fn is_scan_file(path: &Path) -> bool {
-    path.is_file() && kind(path).is_some() && !nifti::is_image_half(path)
+    path.is_file()
+        && kind(path).is_some_and(|kind| kind != Kind::Headerless)
+        && !nifti::is_image_half(path)
 }
 
 fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {
@@ -249,11 +303,17 @@ fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {
     ))
 }
 
+/// How a note begins that says that the file's voxel size was overruled.
+pub const REPLACED: &str = "voxel size replaced";
+
 fn respace(volume: &mut Volume<f32>, wanted: [f64; 3], known: bool, notes: &mut Vec<String>) {
     let old = volume.grid.spacing_mm;
     if known && (0..3).any(|a| (old[a] / wanted[a] - 1.0).abs() > 1e-3) {
+        let words = |s: [f64; 3]| s.map(|v| v.to_string()).join(" × ");
         notes.push(format!(
-            "voxel size {old:?} mm of the file replaced by {wanted:?} mm as asked"
+            "{REPLACED}: the file says {} mm, {} mm are taken as asked (--spacing)",
+            words(old),
+            words(wanted)
         ));
     }
     if let Some(affine) = &mut volume.affine {

@@ -53,7 +53,7 @@ impl Session {
     pub fn say(&self, line: impl AsRef<str>) {
         self.note(line.as_ref());
         if !self.quiet {
-            self.output.bars.suspend(|| eprintln!("{}", line.as_ref()));
+            self.put(line.as_ref());
         }
     }
 
@@ -61,7 +61,7 @@ impl Session {
     pub fn detail(&self, line: impl AsRef<str>) {
         self.note(line.as_ref());
         if self.verbose && !self.quiet {
-            self.output.bars.suspend(|| eprintln!("{}", line.as_ref()));
+            self.put(line.as_ref());
         }
     }
 
@@ -74,9 +74,19 @@ impl Session {
     pub fn warn_of(&self, scan: Option<&str>, line: impl AsRef<str>) {
         let scan = scan.map_or(String::new(), |s| format!("{s}: "));
         self.note(&format!("warning: {}", line.as_ref()));
-        self.output
-            .bars
-            .suspend(|| eprintln!("warning: {scan}{}", line.as_ref()));
+        self.put(&format!("warning: {scan}{}", line.as_ref()));
+    }
+
+    /// What a user should know of how `scan` was understood.
+    pub fn note_of(&self, scan: &str, line: &str) {
+        self.say(format!("note: {scan}: {line}"));
+    }
+
+    /// One line on stderr. A reader that has closed it does not stop the work.
+    fn put(&self, line: &str) {
+        self.output.bars.suspend(|| {
+            let _ = writeln!(std::io::stderr(), "{line}");
+        });
     }
 
     /// A line in the log alone.

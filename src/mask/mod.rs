@@ -7,4 +7,5 @@ pub mod regrid;
 pub mod resample;
 pub mod rotate;
 pub mod threshold;
+pub mod usable;
 pub mod voi;

@@ -4,15 +4,11 @@ use crate::error::{Error, Result};
 use crate::image::orient::{self, Turn};
 use crate::image::{nifti, scan};
 use crate::io::atomic;
-use crate::pipeline::segment::{SegmentParams, SegmentSummary};
+pub use crate::io::own_files::{GREY, MASK, PICTURE, RECORD};
+use crate::pipeline::segment::{SegmentParams, SegmentSummary, shown};
 use crate::volume::{Specimen, Volume};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-
-pub const MASK: &str = "mask.nii.gz";
-pub const RECORD: &str = "segment.json";
-pub const GREY: &str = "grey.nii.gz";
-pub const PICTURE: &str = "segment.png";
 
 /// `segment.json`: what was segmented, how, and what came out; enough to repeat it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -28,6 +24,7 @@ pub struct SegmentRecord {
 /// The scan that was read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Input {
+    #[serde(serialize_with = "shown")]
     pub path: PathBuf,
     /// Of the file, or of the names and contents of a folder's slices.
     pub blake3: String,
@@ -121,12 +118,8 @@ pub fn load_grey(dir: &Path, bone: &Volume<u8>) -> Result<Option<Volume<f32>>> {
     Ok(Some(grey))
 }
 
-/// A mask from any image: non-zero is inside.
-pub fn read_mask(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Volume<u8>> {
-    Ok(mask_of(&scan::read(path, spacing_mm)?.volume))
-}
-
-fn mask_of(volume: &Volume<f32>) -> Volume<u8> {
+/// Non-zero is inside.
+pub fn mask_of(volume: &Volume<f32>) -> Volume<u8> {
     let voxels = volume.as_slice().iter();
     let voxels = voxels.map(|&v| u8::from(v != 0.0 && !v.is_nan()));
     let mut mask = Volume::from_vec(volume.grid, voxels.collect());

@@ -6,6 +6,7 @@ use super::{Model, distinct};
 use crate::result::row::Row;
 use crate::result::settings::CellType;
 use crate::result::statistics::regression::regression;
+use std::collections::HashSet;
 
 /// Curves of one colour and marker: one structure, one model, one set of settings.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,6 +97,19 @@ pub fn convergence(rows: &[Row]) -> Vec<Figure> {
         .into_iter()
         .map(|scan| convergence_of(scan, &solved))
         .collect()
+}
+
+/// Gives each figure a file of its own: names that differ in characters no file system takes, or in case only, are numbered.
+pub fn with_own_files(figures: &mut [Figure]) {
+    let mut used = HashSet::new();
+    for figure in figures {
+        let plain = figure.stem.clone();
+        let mut number = 1;
+        while !used.insert(figure.stem.to_lowercase()) {
+            number += 1;
+            figure.stem = format!("{plain}-{number}");
+        }
+    }
 }
 
 fn convergence_of(scan: &str, solved: &[SolvedRow]) -> Figure {

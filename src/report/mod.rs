@@ -54,6 +54,7 @@ pub fn report(rows: &[Row], params: &ReportParams) -> Report {
     figures.extend(curves::speed_error(rows));
     let (samples, left_out) = sample::samples(rows);
     figures.extend(comparison::figures(&samples));
+    curves::with_own_files(&mut figures);
     let statistics = statistics::statistics(&samples);
     let mut notes = notes(rows);
     notes.extend(left_out);
@@ -232,6 +233,22 @@ mod tests {
         stalled.solved.as_mut().unwrap().converged = Some(false);
         let report = report(&[stalled], &ReportParams::default());
         assert_eq!(report.notes, ["a: not converged (SC floppy 0.1 mm)"]);
+    }
+
+    #[test]
+    fn scans_of_like_names_have_figures_of_their_own() {
+        let names = ["scan 1", "scan_1", "SCAN_1", "scan_1-2"];
+        let rows = names.map(|name| row(name, "floppy", 0.1, 30.0));
+        let report = report(&rows, &ReportParams::default());
+        let mut stems: Vec<String> = report
+            .figures
+            .iter()
+            .map(|figure| figure.stem.to_lowercase())
+            .collect();
+        let all = stems.len();
+        stems.sort();
+        stems.dedup();
+        assert_eq!(stems.len(), all, "{stems:?}");
     }
 
     #[test]

@@ -78,6 +78,19 @@ def refuse(name, path, *words):
     FAILED.extend([] if good else [name])
 
 
+def refused(name, path, said, write):
+    """A file that is no one scan, refused in words that say why."""
+    write(path)
+    try:
+        ask("info", path)
+        words = "it was read"
+    except RuntimeError as e:
+        words = str(e)
+    same = said in words
+    print(f"{'ok      ' if same else 'FAILED  '} {name}: refused" + ("" if same else f": {words}"))
+    FAILED.extend([] if same else [name])
+
+
 def needs(module):
     try:
         return importlib.import_module(module)
@@ -420,15 +433,79 @@ def tifffile_files(dir):
         check(f"tifffile {np.dtype(kind).name}", path, (stored.astype(float) > lower).astype(np.uint8), None,
               extra=("--spacing", "0.02", "--lower", lower), grey=stored)
     bone = GREY > 2999.5
-    for name, photometric, stored in (("black is 0", "minisblack", bone), ("white is 0", "miniswhite", ~bone)):
-        path = dir / f"{photometric}-1-bit.tif"
-        tifffile.imwrite(path, stored, photometric=photometric)
-        check(f"tifffile 1 bit, {name}", path, world, None, extra=("--spacing", "0.02", "--lower", "0.5"), grey=bone)
+    # What shows 0 as white holds the values that tifffile reads back.
+    for photometric in ("minisblack", "miniswhite"):
+        for name, stored in (("1 bit", bone), ("8 bits", bone.astype(np.uint8) * 255), ("16 bits", grey), ("floats", GREY.astype(np.float32))):
+            path = dir / f"{photometric}-{name}.tif"
+            tifffile.imwrite(path, stored, photometric=photometric)
+            back = tifffile.imread(path)
+            lower = 0.5 if name == "1 bit" else 200 if name == "8 bits" else 2999.5
+            check(f"tifffile {name}, {photometric}", path, (back > lower).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", lower), grey=back)
+    path = dir / "shaped.tif"
+    tifffile.imwrite(path, GREY[None, :, None], photometric="minisblack")
+    check("tifffile shaped, axes of one", path, world, None, extra=("--spacing", "0.02"), grey=GREY)
+    refused("tifffile shaped, four axes", dir / "four.tif", "shape", lambda path: tifffile.imwrite(path, np.stack([GREY, GREY]), photometric="minisblack"))
+    for axes, shape, said in (("ZCYX", (2, 3), "2 channels"), ("TZYX", (2, 3), "times")):
+        many = np.broadcast_to(GREY[:3, None], (3, 2) + GREY.shape[1:]) if axes == "ZCYX" else np.broadcast_to(GREY[None, :3], (2, 3) + GREY.shape[1:])
+        refused(f"tifffile OME {axes}", dir / f"{axes}.ome.tif", said, lambda path: tifffile.imwrite(path, np.ascontiguousarray(many), metadata={"axes": axes}))
+    for axes in ("ZCYX", "TZYX"):
+        many = np.ascontiguousarray(np.broadcast_to(grey[:3, None] if axes == "ZCYX" else grey[None, :3], (3, 2) + grey.shape[1:] if axes == "ZCYX" else (2, 3) + grey.shape[1:]))
+        refused(f"tifffile ImageJ {axes}", dir / f"ij_{axes}.tif", "hyperstack", lambda path: tifffile.imwrite(path, many, imagej=True, metadata={"axes": axes}))
+    tifffile.imwrite(dir / "ij_t.tif", grey, imagej=True, resolution=px, metadata={"spacing": 0.05, "unit": "mm", "axes": "TYX"})
+    check("tifffile ImageJ, slices as times", dir / "ij_t.tif", world, iso)
+    tifffile.imwrite(dir / "ij_1.tif", grey, imagej=True, resolution=px, metadata={"unit": "mm", "axes": "ZYX"})
+    check("tifffile ImageJ, depth left out", dir / "ij_1.tif", world, (0.02, 0.02, 1.0))
+    for unit, per in (("\\u00B5m", 20), ("micron", 20), ("nm", 20000), ("cm", 0.002)):
+        path = dir / "ij_unit.tif"
+        tifffile.imwrite(path, grey, imagej=True, resolution=(1 / per, 1 / per), metadata={"spacing": 2.5 * per, "unit": unit, "axes": "ZYX"})
+        check(f"tifffile ImageJ in {unit}", path, world, iso)
+    ome = {"axes": "ZYX", "PhysicalSizeX": 0.02, "PhysicalSizeXUnit": "mm", "PhysicalSizeY": 20000, "PhysicalSizeYUnit": "nm", "PhysicalSizeZ": 0.005, "PhysicalSizeZUnit": "cm"}
+    tifffile.imwrite(dir / "units.ome.tif", GREY, metadata=ome)
+    check("tifffile OME, units of its own for each axis", dir / "units.ome.tif", world, iso)
+    pyramid = dir / "pyramid.ome.tif"
+    with tifffile.TiffWriter(pyramid, ome=True) as out:
+        out.write(GREY, subifds=1, metadata={"axes": "ZYX"})
+        out.write(GREY[:, ::2, ::2], subfiletype=1)
+    check("tifffile OME pyramid", pyramid, world, None, extra=("--spacing", "0.02"), grey=GREY)
+    thumbnail = dir / "thumbnail.tif"
+    with tifffile.TiffWriter(thumbnail) as out:
+        out.write(GREY[0, ::2, ::2], subfiletype=1, photometric="minisblack", metadata=None)
+        for page in GREY:
+            out.write(page, photometric="minisblack", metadata=None)
+    check("tifffile, a page of another resolution first", thumbnail, world, None, extra=("--spacing", "0.02"), grey=GREY)
+    path = dir / "palette.tif"
+    ramp = (np.arange(256, dtype=np.uint16) * 257)[::-1]
+    tifffile.imwrite(path, (GREY // 64).clip(0, 255).astype(np.uint8), photometric="palette", colormap=np.stack([ramp] * 3))
+    back = tifffile.imread(path)
+    check("tifffile palette that inverts", path, (back > 40).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", "40.5"), grey=back)
+    for dpi in (144, 240, 300, 2400):
+        path = dir / "dpi.tif"
+        tifffile.imwrite(path, GREY, photometric="minisblack", resolution=(dpi, dpi), resolutionunit=2)
+        same = ask("info", path)["spacing_mm"] is None
+        print(f"{'ok      ' if same else 'FAILED  '} tifffile {dpi} dpi: no voxel size")
+        FAILED.extend([] if same else [f"{dpi} dpi"])
     if needs("imagecodecs"):
-        for name in ("lzw", "packbits"):
-            path = dir / f"{name}.tif"
-            tifffile.imwrite(path, GREY, photometric="minisblack", compression=name)
-            check(f"tifffile {name}", path, world, None, extra=("--spacing", "0.02"), grey=GREY)
+        for name in ("lzw", "packbits", "zstd", "deflate"):
+            for predictor in (False, True):
+                if name == "packbits" and predictor:
+                    continue
+                for order in "<>":
+                    path = dir / f"{name}.tif"
+                    tifffile.imwrite(path, GREY, photometric="minisblack", compression=name, predictor=predictor, byteorder=order, tile=(16, 16) if predictor else None)
+                    check(f"tifffile {name}, predictor {predictor}, {order}", path, world, None, extra=("--spacing", "0.02"), grey=GREY)
+        path = dir / "float-predictor.tif"
+        tifffile.imwrite(path, GREY.astype(np.float32), photometric="minisblack", compression="zstd", predictor=3)
+        check("tifffile floats with their predictor", path, world, None, extra=("--spacing", "0.02"), grey=GREY)
+        for bits in (2, 3, 5, 6, 7, 9, 10, 12, 14, 15):
+            small = (GREY.clip(0).astype(np.uint32) >> 3) & ((1 << bits) - 1)
+            small = small.astype(np.uint8 if bits <= 8 else np.uint16)
+            path = dir / f"{bits}.tif"
+            tifffile.imwrite(path, small, photometric="minisblack", bitspersample=bits, rowsperstrip=GREY.shape[1])
+            back = tifffile.imread(path)
+            assert (back == small).all(), "tifffile reads something else"
+            lower = (1 << bits) // 2
+            check(f"tifffile {bits} bits", path, (back >= lower).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", lower), grey=back)
+        refused("tifffile LZMA", dir / "lzma.tif", "LZMA", lambda path: tifffile.imwrite(path, GREY, photometric="minisblack", compression="lzma"))
     tifffile.imwrite(dir / "float.tif", GREY.astype(np.float32), photometric="minisblack")
     check("tifffile float32", dir / "float.tif", world, None, extra=("--spacing", "0.02"))
     tifffile.imwrite(dir / "ome.ome.tif", GREY, metadata={"axes": "ZYX", "PhysicalSizeX": 20.0, "PhysicalSizeXUnit": "µm", "PhysicalSizeY": 20.0, "PhysicalSizeYUnit": "µm", "PhysicalSizeZ": 50.0, "PhysicalSizeZUnit": "µm"})
@@ -459,8 +536,30 @@ def numpy_files(dir):
     world = (GREY > 2999.5).astype(np.uint8)
     np.save(dir / "c.npy", GREY)
     np.save(dir / "f.npy", np.asfortranarray(GREY.astype(">f4")))
-    for name in ("c.npy", "f.npy"):
+    small = (GREY // 64).astype(np.float16)
+    np.save(dir / "half.npy", small)
+    np.save(dir / "one.npy", GREY[None, ..., None])
+    np.savez(dir / "scan.npz", spacing=np.array([0.02] * 3), scan=GREY)
+    np.savez_compressed(dir / "packed.npz", scan=np.asfortranarray(GREY))
+    for name in ("c.npy", "f.npy", "one.npy", "scan.npz", "packed.npz"):
         check(f"numpy {name}", dir / name, world, None, extra=("--spacing", "0.02"))
+    check("numpy half.npy", dir / "half.npy", (small > 46.5).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", "46.5"), grey=small)
+    for order in "<>":
+        for kind in ("u1", "i2", "u2", "i4", "f4", "f8"):
+            path = dir / "voxels.raw"
+            values = (GREY // 64).clip(0) if kind == "u1" else GREY.clip(0)
+            path.write_bytes(bytes(64) + values.astype(order + kind).tobytes())
+            lower = 46.5 if kind == "u1" else 2999.5
+            name = np.dtype(kind).name + ("be" if order == ">" else "")
+            contents = ",".join(map(str, GREY.shape[::-1])) + f",{name},64"
+            with tempfile.TemporaryDirectory() as out:
+                import nibabel
+
+                ask("segment", path, "-o", out, "--raw", contents, "--spacing", "0.02", "--lower", lower, "--keep-all")
+                found = np.asarray(nibabel.load(pathlib.Path(out) / "mask.nii.gz").dataobj).T
+            same = (found == (values > lower)).all()
+            print(f"{'ok      ' if same else 'FAILED  '} voxels without a header, {name}")
+            FAILED.extend([] if same else [name])
 
 
 def pillow_files(dir):

@@ -21,6 +21,7 @@ pub enum Scalar {
     I32,
     U64,
     I64,
+    F16,
     F32,
     F64,
 }
@@ -29,7 +30,7 @@ impl Scalar {
     pub fn bytes(self) -> usize {
         match self {
             Scalar::U8 | Scalar::I8 => 1,
-            Scalar::U16 | Scalar::I16 => 2,
+            Scalar::U16 | Scalar::I16 | Scalar::F16 => 2,
             Scalar::U32 | Scalar::I32 | Scalar::F32 => 4,
             Scalar::U64 | Scalar::I64 | Scalar::F64 => 8,
         }
@@ -45,6 +46,7 @@ impl Scalar {
             Scalar::I32 => "int32",
             Scalar::U64 => "uint64",
             Scalar::I64 => "int64",
+            Scalar::F16 => "float16",
             Scalar::F32 => "float32",
             Scalar::F64 => "float64",
         }
@@ -332,6 +334,7 @@ pub fn decode(bytes: &[u8], layout: &Layout, out: &mut Vec<f32>) {
             }
         }};
     }
+
     match layout.scalar {
         Scalar::U8 => of!(u8),
         Scalar::I8 => of!(i8),
@@ -341,6 +344,13 @@ pub fn decode(bytes: &[u8], layout: &Layout, out: &mut Vec<f32>) {
         Scalar::I32 => of!(i32),
         Scalar::U64 => of!(u64),
         Scalar::I64 => of!(i64),
+        Scalar::F16 => out.extend(bytes.chunks_exact(2).map(|c| {
+            let bits = match layout.big_endian {
+                true => u16::from_be_bytes([c[0], c[1]]),
+                false => u16::from_le_bytes([c[0], c[1]]),
+            };
+            (layout.slope * half::f16::from_bits(bits).to_f64() + layout.intercept) as f32
+        })),
         Scalar::F32 => of!(f32),
         Scalar::F64 => of!(f64),
     }

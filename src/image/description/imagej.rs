@@ -1,16 +1,111 @@
 //! Owns what ImageJ and Fiji note in the description of a TIFF's first page: how many slices, their distance, and what the
 //! values mean.
+//!
+//! Keys, one a line as `key=value` after `ImageJ=version`, and what becomes of each. A test of the repository reads this table
+//! and tries every row.
+//!
+//! | key | what becomes of it |
+//! |---|---|
+//! | images | read: refused where the pages are others |
+//! | channels | read: refused above 1 |
+//! | slices | read |
+//! | frames | read: refused above 1 beside several slices, else taken as slices with a note |
+//! | hyperstack | harmless |
+//! | mode | harmless |
+//! | order | harmless: with one channel, one order is left |
+//! | unit | read: of x, and of y and z where they have none; one that is no length is said |
+//! | yunit | read |
+//! | zunit | read |
+//! | spacing | read: without its sign; a stack without it has 1 unit |
+//! | cf | read: 0 is a line; other functions are said and not applied |
+//! | c0 | read |
+//! | c1 | read |
+//! | c2 | harmless |
+//! | c3 | harmless |
+//! | c4 | harmless |
+//! | vunit | read: HU |
+//! | xorigin | harmless |
+//! | yorigin | harmless |
+//! | zorigin | harmless |
+//! | finterval | harmless |
+//! | fps | harmless |
+//! | tunit | harmless |
+//! | loop | harmless |
+//! | min | harmless |
+//! | max | harmless |
 
-/// The notes of one file. 0 where a count is not told.
-#[derive(Debug, Default, PartialEq)]
+use crate::image::description::length::{is_pixel, millimetres_per};
+
+/// The notes of one file. 0 where a count is not in them.
+#[derive(Debug, Default, Clone, PartialEq)]
 pub struct ImageJ {
     pub images: usize,
     pub channels: usize,
+    pub slices: usize,
     pub frames: usize,
-    /// Millimetres per unit; None where the unit is pixels or unknown.
-    pub unit_mm: Option<f64>,
-    pub spacing: Option<f64>,
+    /// Along x, y, z; empty where it is not in them.
+    units: [String; 3],
+    spacing: Option<f64>,
     pub grey: Grey,
+}
+
+impl ImageJ {
+    /// What speaks against taking the file for one scan, in words.
+    pub fn fault(&self) -> Option<String> {
+        let [c, z, t] = [self.channels, self.slices, self.frames].map(|n| n.max(1));
+        (c > 1 || z > 1 && t > 1)
+            .then(|| format!("is an ImageJ hyperstack of {c} channels, {z} slices and {t} frames"))
+    }
+
+    /// Millimetres per unit along an axis; None for pixels and what is no length.
+    fn unit_mm(&self, axis: usize) -> Option<f64> {
+        millimetres_per(self.unit(axis))
+    }
+
+    fn unit(&self, axis: usize) -> &str {
+        match self.units[axis].as_str() {
+            "" => &self.units[0],
+            own => own,
+        }
+    }
+
+    /// Size of a pixel, of which there are `per_unit` in a unit.
+    pub fn pixel_mm(&self, per_unit: [f64; 2]) -> Option<[f64; 2]> {
+        Some([
+            self.unit_mm(0)? / per_unit[0],
+            self.unit_mm(1)? / per_unit[1],
+        ])
+    }
+
+    /// Distance of the slices of a stack. ImageJ leaves it out where it is 1 unit.
+    pub fn slice_mm(&self) -> Option<f64> {
+        Some(self.spacing.unwrap_or(1.0) * self.unit_mm(2)?)
+    }
+
+    /// What a user should know of the size of a stack's voxels.
+    pub fn size_notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let unit = self.unit(axis);
+            let own = axis == 0 || !self.units[axis].is_empty();
+            if own && self.unit_mm(axis).is_none() && !is_pixel(unit) {
+                notes.push(format!("ImageJ's unit along {name} is `{unit}`, which is no length that is known: the size is not taken"));
+            }
+        }
+        if let (None, Some(mm)) = (self.spacing, self.slice_mm()) {
+            notes.push(format!(
+                "ImageJ's notes tell no distance of slices, which is how it writes 1 {} ({mm} mm)",
+                self.unit(2)
+            ));
+        }
+        if self.frames > 1 {
+            notes.push(format!(
+                "ImageJ's notes call the {} slices frames of time: read as slices (in Fiji: Image > Properties, swap slices and frames)",
+                self.frames
+            ));
+        }
+        notes
+    }
 }
 
 /// ImageJ's calibration of grey values (Analyze > Calibrate).
@@ -91,9 +186,13 @@ pub fn imagej(description: &str) -> ImageJ {
         match key.trim() {
             "images" => found.images = value.parse().unwrap_or(0),
             "channels" => found.channels = value.parse().unwrap_or(0),
+            "slices" => found.slices = value.parse().unwrap_or(0),
             "frames" => found.frames = value.parse().unwrap_or(0),
-            "unit" => found.unit_mm = unit_mm(value),
-            "spacing" => found.spacing = number().filter(|s| *s > 0.0),
+            "unit" => found.units[0] = value.to_owned(),
+            "yunit" => found.units[1] = value.to_owned(),
+            "zunit" => found.units[2] = value.to_owned(),
+            // Zero is ImageJ's own default, 1, too; its sign says which way the stage moved.
+            "spacing" => found.spacing = number().map(f64::abs).filter(|s| *s > 0.0),
             "cf" => function = value.parse().unwrap_or(NO_FUNCTION),
             "c0" => line[0] = number(),
             "c1" => line[1] = number(),
@@ -110,21 +209,6 @@ pub fn imagej(description: &str) -> ImageJ {
         (other, _) => Function::Other(other),
     };
     found
-}
-
-/// Millimetres per unit of length as Fiji spells it.
-pub fn unit_mm(unit: &str) -> Option<f64> {
-    Some(match unit.trim().to_lowercase().as_str() {
-        "mm" | "millimeter" | "millimeters" | "millimetre" => 1.0,
-        "um" | "µm" | "μm" | "\\u00b5m" | "micron" | "microns" | "micrometer" | "micrometre" => {
-            1e-3
-        }
-        "nm" | "nanometer" | "nanometre" => 1e-6,
-        "cm" | "centimeter" | "centimetre" => 10.0,
-        "m" | "meter" | "metre" => 1e3,
-        "inch" | "inches" | "in" => 25.4,
-        _ => return None,
-    })
 }
 
 #[cfg(test)]

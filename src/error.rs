@@ -2,26 +2,30 @@
 
 use std::path::{Path, PathBuf};
 
+/// Between what was found and what to do about it.
+pub const ADVICE: &str = "\n  what to do: ";
+
 /// Every failure the library reports. All of them end a command with exit code 2; a solve that did not converge is
 /// a marked result, not an error.
 #[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A file or folder that cannot be read, understood or written.
-    #[error("{}: {found}\n  what to do: {advice}", path.display())]
+    #[error("{}: {found}{}{advice}", path.display(), ADVICE)]
     File {
         path: PathBuf,
         found: String,
         advice: String,
     },
     /// A setting (flag, recipe key or parameter) with an unusable value.
-    #[error("{key}: {found}\n  what to do: {advice}")]
+    #[error("{key}: {found}{}{advice}", ADVICE)]
     Setting {
         key: String,
         found: String,
         advice: String,
     },
     /// A specimen or scene for which the request makes no sense.
-    #[error("{found}\n  what to do: {advice}")]
+    #[error("{found}{}{advice}", ADVICE)]
     Specimen { found: String, advice: String },
 }
 

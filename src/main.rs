@@ -3,6 +3,7 @@
 mod cli;
 
 use bonepd_ct::command::Outcome;
+use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -10,18 +11,23 @@ fn main() -> ExitCode {
     match cli::run() {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::NotConverged) => {
-            eprintln!(
-                "not converged, or the error asked for not met: results are written, the rows say so"
+            put(
+                "warning: not converged, or the error asked for not met: results are written, the rows say so",
             );
             ExitCode::from(1)
         }
         Ok(Outcome::SomeFailed(scans)) => {
-            eprintln!("failed: {}", scans.join(", "));
+            put(&format!("error: failed: {}", scans.join(", ")));
             ExitCode::from(1)
         }
         Err(error) => {
-            eprintln!("error: {error}");
+            put(&format!("error: {error}"));
             ExitCode::from(2)
         }
     }
+}
+
+/// One line on stderr. Nobody may be reading it any more.
+fn put(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -63,7 +63,7 @@ pub struct Specimen {
     pub name: String,
     /// 1 where bone, 0 elsewhere.
     pub bone: Volume<u8>,
-    /// Volume of interest in mm³, pores included (a cylinder's π d²/4 · L, not its bounding box).
+    /// Volume of interest in mm³, pores included (a cylinder's voxels, not its bounding box).
     pub tv_mm3: f64,
     /// How TV was defined, in words ("box", "cylinder d=10 mm", "mask FILE").
     pub tv_definition: String,

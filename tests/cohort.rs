@@ -150,6 +150,10 @@ fn jobs_at_a_time_change_nothing_but_time() {
     ];
     assert_eq!(run(&args).0, 0);
     assert_eq!(timeless(&one), timeless(&three));
+    // The process's memory is one scan's only where no other scan runs.
+    let peak = |row: &Row| row.solved.as_ref().unwrap().peak_mib;
+    let known = |out| rows(out).iter().any(|row| peak(row).is_some());
+    assert_eq!((known(&one), known(&three)), (true, false));
 }
 
 /// Starts the run and kills it once `files` more results are there; false when it was done first.

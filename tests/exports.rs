@@ -106,7 +106,7 @@ fn exported_lattices_of_mixed_tissue_store_the_energy_of_the_lattice() {
             .collect(),
         (0..voxels).map(|i| 0.4 + (i % 101) as f32 / 80.0).collect(),
     ];
-    for boundary in [Boundary::Floppy, Boundary::Graded] {
+    for boundary in [Boundary::Floppy, Boundary::Weighted] {
         for tissue in &tissues {
             let case = case(boundary);
             let sites = build_of(&specimen, Some(tissue), &case, Axis::Z, 0.0).unwrap();
@@ -114,7 +114,7 @@ fn exported_lattices_of_mixed_tissue_store_the_energy_of_the_lattice() {
             let u: Vec<[f64; 3]> = (0..sites.len())
                 .map(|s| [1, 2, 3].map(|c| ((s * 7 + c * 13) % 31) as f64 * 1e-4))
                 .collect();
-            let exact = Lattice::new(&sites, moduli).energy(&u);
+            let exact = Lattice::new(sites.clone(), moduli).energy(&u);
             let written = |bins: usize| {
                 let tissue = lammps::Tissue {
                     young_mpa: 700.0,
@@ -156,7 +156,7 @@ fn read_inp(text: &str) -> Vec<(f64, f64, usize)> {
 #[test]
 fn every_element_of_an_inp_has_the_material_of_its_voxel() {
     let n = [6, 5, 8];
-    let mut specimen = crate::made::specimen(n, [0.02; 3], |_| true);
+    let mut specimen = crate::specimens::specimen(n, [0.02; 3], |_| true);
     let grid = specimen.bone.grid;
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("model.inp");
@@ -217,7 +217,7 @@ fn every_element_of_an_inp_has_the_material_of_its_voxel() {
 fn vtk_has_as_many_bytes_as_its_counts_ask_for() {
     let sites = build(
         &crate::laws::irregular_specimen(),
-        &case(Boundary::Graded),
+        &case(Boundary::Weighted),
         Axis::Z,
         0.0,
     )

@@ -8,6 +8,7 @@
 
 mod allocation;
 mod damage;
+mod headers;
 mod samples;
 
 use bonepd_ct::cohort::scans;
@@ -45,7 +46,7 @@ struct Found {
 fn take(target: &Path, spacing_mm: Option<[f64; 3]>) -> bool {
     let name = target.file_name().unwrap().to_str().unwrap();
     match name {
-        "manifest.csv" => {
+        "manifest.csv" | "manifest.tsv" => {
             let session = Session {
                 quiet: true,
                 ..Session::default()
@@ -61,7 +62,7 @@ fn take(target: &Path, spacing_mm: Option<[f64; 3]>) -> bool {
         }
         _ => {}
     }
-    let needs = estimate::estimate(target, spacing_mm, &Recipe::default());
+    let needs = estimate::estimate(target, spacing_mm, &Recipe::default()).unwrap();
     assert!(needs.memory_mib > 0.0, "{needs:?}");
     let _ = extent::of(target);
     let _ = info::info(target);
@@ -232,7 +233,7 @@ fn a_million_damaged_files() {
 fn files_under_a_wrong_name_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let samples = samples();
-    let single = |s: &&Sample| s.beside.is_empty() && !s.name.ends_with(".csv");
+    let single = |s: &&Sample| s.beside.is_empty() && !s.name.ends_with("sv");
     for (a, b) in samples.iter().filter(single).flat_map(|a| {
         let others = samples.iter().filter(single);
         others.map(move |b| (a, b))
@@ -241,7 +242,9 @@ fn files_under_a_wrong_name_are_refused() {
         let path = dir.path().join("a").with_extension(end(b));
         // Whether a NIfTI file is compressed is told by its first bytes, not by its name.
         let unpacked = a.name == "a.nii.gz" && end(b) == "nii";
-        if end(a) == end(b) || end(b) == "toml" || unpacked {
+        // So is a DICOM file, where its name says nothing else.
+        let unnamed = a.name.ends_with(".dcm") && end(b) == "gz";
+        if end(a) == end(b) || end(b) == "toml" || unpacked || unnamed {
             continue;
         }
         std::fs::write(&path, &a.bytes).unwrap();

@@ -1,35 +1,89 @@
-//! The table of three-dimensional models, and the laws every one of them must obey. A new physics is one row.
+//! The table of three-dimensional models, and the laws every one of them must obey. A new discretisation is one row. Models of
+//! the plane have a table of their own ([`plane`]).
+
+mod plane;
 
 use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::{Axis, Grid};
-use bonepd_ct::operator::Operator;
+use bonepd_ct::operator::coarsen::Coarsen;
 use bonepd_ct::operator::held::{Constrained, Held};
+use bonepd_ct::operator::{MixedPrecision, Operator};
 use bonepd_ct::par::dot;
 use bonepd_ct::physics::hex8::Hex8;
-use bonepd_ct::physics::hex8::element::{Integration, stiffness};
-use bonepd_ct::physics::hex8::graded::Graded;
-use bonepd_ct::physics::lattice::connected::ConnectedLattice;
+use bonepd_ct::physics::hex8::element::{ElementMatrix, Integration, stiffness};
+use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
+use bonepd_ct::physics::lattice::connected::{ConnectedLattice, ConnectedSprings};
+use bonepd_ct::physics::lattice::multigrid::Springs;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build, build_connected};
+use bonepd_ct::pipeline::lattice::{
+    Boundary, Case, Structure, build_connected, build_of, site_values,
+};
 use bonepd_ct::solver::cg::jacobi::Jacobi;
 use bonepd_ct::solver::cg::{CgParams, ENERGY_ALONE, minimise};
 use bonepd_ct::volume::{Specimen, Volume};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::collections::HashMap;
+use std::sync::LazyLock;
 
 type Field = Vec<[f64; 3]>;
-type Energy = Box<dyn Fn(&[[f64; 3]]) -> f64>;
+type Energy = Box<dyn Fn(&[[f64; 3]]) -> f64 + Send + Sync>;
+type Single = Box<dyn Fn(&[[f32; 3]]) -> Vec<[f32; 3]> + Send + Sync>;
 
-/// One row: a model on an irregular specimen.
+/// One row: a model on an irregular specimen. Operators live as long as the test program.
 struct Model {
     name: String,
-    operator: Box<dyn Operator<3>>,
+    operator: &'static dyn Operator<3>,
+    /// `A x` in single precision.
+    single: Single,
+    /// What multigrid asks for, where the model is what multigrid is built on.
+    coarsen: Option<&'static dyn Coarsen>,
     positions: Field,
     energy: Energy,
 }
 
-/// A 14³ box of voxels with holes, lumps and free corners, and unequal spacing.
+impl Model {
+    fn of<O: MixedPrecision>(
+        name: String,
+        operator: &'static O,
+        positions: Field,
+        energy: Energy,
+    ) -> Self {
+        Model {
+            name,
+            operator,
+            single: Box::new(|x| {
+                let mut y = vec![[0.0; 3]; x.len()];
+                operator.apply_single(x, &mut y, |_, _| 0.0);
+                y
+            }),
+            coarsen: None,
+            positions,
+            energy,
+        }
+    }
+
+    /// A model whose rows multigrid reads.
+    fn of_rows<O: Coarsen>(
+        name: String,
+        operator: &'static O,
+        positions: Field,
+        energy: Energy,
+    ) -> Self {
+        Model {
+            coarsen: Some(operator),
+            ..Model::of(name, operator, positions, energy)
+        }
+    }
+}
+
+static MODELS: LazyLock<Vec<Model>> = LazyLock::new(models);
+
+fn leaked<T>(value: T) -> &'static T {
+    Box::leak(Box::new(value))
+}
+
+/// A box of 14 × 13 × 12 voxels with holes, lumps and free corners, and unequal spacing.
 pub fn irregular_specimen() -> Specimen {
     let grid = Grid::new([14, 13, 12], [0.021, 0.02, 0.019]);
     let mut random = Pcg64::seed_from_u64(3);
@@ -48,120 +102,206 @@ pub fn irregular_specimen() -> Specimen {
     }
 }
 
-fn lattice_row(structure: Structure, boundary: Boundary, poisson: f64) -> Model {
-    let case = Case {
+/// How the tissue of a row differs from voxel to voxel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum TissueRow {
+    Uniform,
+    /// In its modulus.
+    Young,
+    /// In both moduli: sites have volumetric moduli of their own.
+    Both,
+}
+
+fn case(structure: Structure, boundary: Boundary) -> Case {
+    Case {
         structure,
         lp_mm: 0.04,
         boundary,
         registration_mm: [0.0; 3],
-    };
-    // A row lives as long as the test program, so its sites may, too.
-    let sites = Box::leak(Box::new(
-        build(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap(),
-    ));
-    assert!(
-        sites.len() > 100,
-        "{structure:?} {boundary:?}: {} sites",
-        sites.len()
-    );
-    let moduli = Moduli::new(structure, 0.04, 1000.0, poisson).unwrap();
-    let positions = sites
-        .indices
-        .iter()
-        .map(|&i| sites.frame.position_mm(i))
-        .collect();
-    let twin = Lattice::new(sites, moduli);
-    Model {
-        name: format!("{} {} ν={poisson}", structure.name(), boundary.name()),
-        operator: Box::new(Lattice::new(sites, moduli)),
-        positions,
-        energy: Box::new(move |u| twin.energy(u)),
     }
 }
 
-/// Voxel elements, equal or graded; the energy is summed element by element from the element's matrix.
-fn hex8_row(poisson: f64, rule: Integration, graded: bool) -> Model {
+fn lattice(case: &Case, poisson: f64, tissue: TissueRow) -> Lattice {
+    let specimen = irregular_specimen();
+    let voxels = specimen.bone.as_slice().len();
+    let factors: Vec<f32> = (0..voxels).map(|v| 0.5 + (v % 7) as f32 / 4.0).collect();
+    let of_voxels = (tissue != TissueRow::Uniform).then_some(&factors[..]);
+    let sites = build_of(&specimen, of_voxels, case, Axis::Z, 0.0).unwrap();
+    assert!(sites.len() > 100, "{case:?}: {} sites", sites.len());
+    let moduli = Moduli::new(case.structure, case.lp_mm, 1000.0, poisson).unwrap();
+    match tissue {
+        TissueRow::Uniform | TissueRow::Young => Lattice::new(sites, moduli),
+        TissueRow::Both => {
+            let dilatation: Vec<f32> = (0..voxels).map(|v| 0.2 + (v % 5) as f32 / 3.0).collect();
+            let of_sites = site_values(&specimen, &dilatation, case, &sites);
+            let own = of_sites.into_iter().map(|v| v * moduli.t).collect();
+            Lattice::with_volumetric(sites, moduli, own)
+        }
+    }
+}
+
+fn lattice_row(structure: Structure, boundary: Boundary, poisson: f64, tissue: TissueRow) -> Model {
+    let lattice = leaked(lattice(&case(structure, boundary), poisson, tissue));
+    let sites = &lattice.sites;
+    let positions = sites.indices.iter().map(|&i| sites.frame.position_mm(i));
+    let name = format!(
+        "{} {} ν={poisson} tissue {tissue:?}",
+        structure.name(),
+        boundary.name()
+    );
+    let energy = Box::new(|u: &[[f64; 3]]| lattice.energy(u));
+    Model::of(name, lattice, positions.collect(), energy)
+}
+
+/// The springs of a lattice: its energy without the volumetric term.
+fn springs_row(structure: Structure, boundary: Boundary) -> Model {
+    let case = case(structure, boundary);
+    let whole = leaked(lattice(&case, 0.3, TissueRow::Uniform));
+    let moduli = Moduli::new(structure, case.lp_mm, 1000.0, 0.3).unwrap();
+    let alone = Lattice::new(whole.sites.clone(), Moduli { t: 0.0, ..moduli });
+    let sites = &whole.sites;
+    let positions = sites.indices.iter().map(|&i| sites.frame.position_mm(i));
+    Model::of_rows(
+        format!("springs of {} {}", structure.name(), boundary.name()),
+        leaked(Springs::new(whole)),
+        positions.collect(),
+        Box::new(move |u| alone.energy(u)),
+    )
+}
+
+fn connected(poisson: f64, volumetric: bool) -> ConnectedLattice {
+    let case = case(Structure::Sc, Boundary::Connected);
+    let sites = build_connected(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap();
+    assert!(sites.len() > 100, "{} components", sites.len());
+    let moduli = Moduli::new(Structure::Sc, case.lp_mm, 1000.0, poisson).unwrap();
+    let t = if volumetric { moduli.t } else { 0.0 };
+    ConnectedLattice::new(sites, Moduli { t, ..moduli })
+}
+
+fn connected_positions(lattice: &ConnectedLattice) -> Field {
+    let sites = &lattice.sites;
+    let positions = sites.indices.iter().map(|&i| sites.frame.position_mm(i));
+    positions.collect()
+}
+
+fn connected_row(poisson: f64) -> Model {
+    let lattice = leaked(connected(poisson, true));
+    Model::of(
+        format!("sc connected ν={poisson}"),
+        lattice,
+        connected_positions(lattice),
+        Box::new(|u| lattice.energy(u)),
+    )
+}
+
+fn connected_springs_row() -> Model {
+    let (whole, alone) = (leaked(connected(0.3, true)), connected(0.3, false));
+    Model::of_rows(
+        "springs of sc connected".into(),
+        leaked(ConnectedSprings(whole)),
+        connected_positions(whole),
+        Box::new(move |u| alone.energy(u)),
+    )
+}
+
+/// Voxel elements made by `build`; their energy is summed element by element from the matrix and the factor of each.
+fn element_row<O: Coarsen + 'static>(
+    name: &str,
+    build: impl Fn(VoxelMesh) -> O,
+    element: impl Fn(usize) -> (ElementMatrix, f64) + Send + Sync + 'static,
+) -> Model {
     let bone = irregular_specimen().bone;
     let grips = Planes::within(&bone.grid, Axis::Z, 0.0).unwrap();
-    let factor = move |e: usize| if graded { 0.5 + (e % 5) as f32 } else { 1.0 };
     let mesh = VoxelMesh::new(bone.grid, bone.as_slice(), |b| *b != 0, grips).unwrap();
     let positions: Field = (0..mesh.len()).map(|i| mesh.position(i)).collect();
     let numbers: HashMap<[u32; 3], usize> = (0..mesh.len())
         .filter(|&i| mesh.around[i] != 0)
         .map(|i| (mesh.indices(i), i))
         .collect();
-    let elements: Vec<([usize; 8], f64)> = mesh
+    let elements: Vec<([usize; 8], usize)> = mesh
         .low_corner_elements()
         .enumerate()
         .filter_map(|(node, element)| {
             let at = mesh.indices(node);
             let corner = |c: usize| numbers[&std::array::from_fn(|a| at[a] + (c as u32 >> a & 1))];
-            element.map(|e| (std::array::from_fn(corner), f64::from(factor(e))))
+            element.map(|e| (std::array::from_fn(corner), e))
         })
         .collect();
-    let k = stiffness(bone.grid.spacing_mm, 1000.0, poisson, rule);
     let energy = move |u: &[[f64; 3]]| {
-        let of = |(corners, factor): &([usize; 8], f64)| {
+        let of = |&(corners, e): &([usize; 8], usize)| {
+            let (k, factor) = element(e);
             let u: [f64; 24] = std::array::from_fn(|i| u[corners[i / 3]][i % 3]);
             let forces = k.map(|row| row.iter().zip(&u).map(|(a, b)| a * b).sum::<f64>());
             0.5 * factor * forces.iter().zip(&u).map(|(f, u)| f * u).sum::<f64>()
         };
         elements.iter().map(of).sum()
     };
-    let operator: Box<dyn Operator<3>> = if graded {
-        Box::new(Graded::new(mesh, 1000.0, poisson, rule, factor))
-    } else {
-        Box::new(Hex8::new(mesh, 1000.0, poisson, rule))
-    };
-    Model {
-        name: format!("hex8 {rule:?} graded={graded} ν={poisson}"),
-        operator,
-        positions,
-        energy: Box::new(energy),
-    }
+    let operator = leaked(build(mesh));
+    Model::of_rows(name.into(), operator, positions, Box::new(energy))
+}
+
+fn spacing() -> [f64; 3] {
+    irregular_specimen().bone.grid.spacing_mm
+}
+
+fn matrix(poisson: f64, rule: Integration) -> ElementMatrix {
+    stiffness(spacing(), 1000.0, poisson, rule)
+}
+
+/// Elements of one material.
+fn hex8_row(poisson: f64, rule: Integration) -> Model {
+    let k = matrix(poisson, rule);
+    element_row(
+        &format!("hex8 {rule:?} ν={poisson}"),
+        |mesh| Hex8::new(mesh, 1000.0, poisson, rule),
+        move |_| (k, 1.0),
+    )
+}
+
+/// Elements of as many materials as `kinds`, and a factor each.
+fn heterogeneous_row(kinds: &'static [(f64, Integration)]) -> Model {
+    let matrices: Vec<ElementMatrix> = kinds.iter().map(|&(nu, rule)| matrix(nu, rule)).collect();
+    let factor = |e: usize| 0.5 + (e % 5) as f32;
+    let kind = move |e: usize| e % 3 % kinds.len();
+    element_row(
+        &format!("heterogeneous hex8 {kinds:?}"),
+        |mesh| Heterogeneous::of_kinds(mesh, 1000.0, kinds, factor, |e| kind(e) as u8),
+        move |e| (matrices[kind(e)], f64::from(factor(e))),
+    )
 }
 
 fn models() -> Vec<Model> {
+    use Integration::{Full, MeanDilatation};
     let mut rows = vec![
-        hex8_row(0.3, Integration::Full, false),
-        hex8_row(0.3, Integration::Full, true),
-        hex8_row(0.49, Integration::MeanDilatation, false),
+        hex8_row(0.3, Full),
+        hex8_row(0.49, MeanDilatation),
+        heterogeneous_row(&[(0.3, Full)]),
+        heterogeneous_row(&[(0.3, Full), (0.49, MeanDilatation)]),
+        connected_springs_row(),
     ];
     for structure in Structure::ALL {
-        for boundary in [Boundary::Floppy, Boundary::Firm, Boundary::Graded] {
+        let by_bone = match structure {
+            Structure::Sc => None,
+            Structure::Bcc | Structure::Fcc => Some(Boundary::Weighted),
+        };
+        for boundary in [Some(Boundary::Floppy), Some(Boundary::Firm), by_bone] {
+            let Some(boundary) = boundary else { continue };
             for poisson in [0.25, 0.3] {
-                rows.push(lattice_row(structure, boundary, poisson));
+                rows.push(lattice_row(
+                    structure,
+                    boundary,
+                    poisson,
+                    TissueRow::Uniform,
+                ));
             }
+            rows.push(lattice_row(structure, boundary, 0.25, TissueRow::Young));
+            rows.push(lattice_row(structure, boundary, 0.3, TissueRow::Young));
+            rows.push(lattice_row(structure, boundary, 0.3, TissueRow::Both));
+            rows.push(springs_row(structure, boundary));
         }
     }
     rows.extend([0.0, 0.25, 0.3, 0.45].map(connected_row));
     rows
-}
-
-fn connected_row(poisson: f64) -> Model {
-    let case = Case {
-        structure: Structure::Sc,
-        lp_mm: 0.04,
-        boundary: Boundary::Graded,
-        registration_mm: [0.0; 3],
-    };
-    let pieces = Box::leak(Box::new(
-        build_connected(&irregular_specimen(), &case, Axis::Z, 0.0).unwrap(),
-    ));
-    assert!(pieces.len() > 100, "{} pieces", pieces.len());
-    let moduli = Moduli::new(Structure::Sc, 0.04, 1000.0, poisson).unwrap();
-    let positions = pieces
-        .indices
-        .iter()
-        .map(|&i| pieces.frame.position_mm(i))
-        .collect();
-    let twin = ConnectedLattice::new(pieces, moduli);
-    Model {
-        name: format!("sc graded in pieces ν={poisson}"),
-        operator: Box::new(ConnectedLattice::new(pieces, moduli)),
-        positions,
-        energy: Box::new(move |u| twin.energy(u)),
-    }
 }
 
 fn random_field(n: usize, seed: u64) -> Field {
@@ -183,17 +323,17 @@ fn largest(v: &[[f64; 3]]) -> f64 {
 
 #[test]
 fn operators_are_symmetric() {
-    for m in models() {
+    for m in &*MODELS {
         let (x, y) = (
             random_field(m.positions.len(), 1),
             random_field(m.positions.len(), 2),
         );
         let (left, right) = (
-            dot(&y, &applied(&*m.operator, &x)),
-            dot(&x, &applied(&*m.operator, &y)),
+            dot(&y, &applied(m.operator, &x)),
+            dot(&x, &applied(m.operator, &y)),
         );
         // Measured: at most 1e-15 of the products' scale.
-        let scale = dot(&x, &applied(&*m.operator, &x));
+        let scale = dot(&x, &applied(m.operator, &x));
         assert!(
             (left - right).abs() < 1e-13 * scale,
             "{}: {left} {right}",
@@ -204,11 +344,11 @@ fn operators_are_symmetric() {
 
 #[test]
 fn rigid_motions_are_force_free() {
-    for m in models() {
-        let scale = largest(&applied(&*m.operator, &random_field(m.positions.len(), 1)));
+    for m in &*MODELS {
+        let scale = largest(&applied(m.operator, &random_field(m.positions.len(), 1)));
         for motion in 0..6 {
             let u: Field = m.positions.iter().map(|&p| rigid(p, motion)).collect();
-            let force = largest(&applied(&*m.operator, &u));
+            let force = largest(&applied(m.operator, &u));
             assert!(
                 force < 1e-13 * scale,
                 "{} motion {motion}: {force} of {scale}",
@@ -232,8 +372,8 @@ fn rigid(p: [f64; 3], motion: usize) -> [f64; 3] {
 
 #[test]
 fn forces_sum_to_zero() {
-    for m in models() {
-        let force = applied(&*m.operator, &random_field(m.positions.len(), 4));
+    for m in &*MODELS {
+        let force = applied(m.operator, &random_field(m.positions.len(), 4));
         for c in 0..3 {
             let sum: f64 = force.iter().map(|f| f[c]).sum();
             assert!(
@@ -247,9 +387,9 @@ fn forces_sum_to_zero() {
 
 #[test]
 fn the_force_is_the_gradient_of_the_energy() {
-    for m in models() {
+    for m in &*MODELS {
         let u = random_field(m.positions.len(), 5);
-        let force = applied(&*m.operator, &u);
+        let force = applied(m.operator, &u);
         let direction = random_field(m.positions.len(), 6);
         // Quadratic energy: central differences are exact but for rounding.
         let step = 1e-3;
@@ -269,7 +409,7 @@ fn the_force_is_the_gradient_of_the_energy() {
 
 #[test]
 fn the_diagonal_is_that_of_the_operator() {
-    for m in models() {
+    for m in &*MODELS {
         let n = m.positions.len();
         let mut diagonal = vec![[0.0; 3]; n];
         m.operator.diagonal(&mut diagonal);
@@ -277,7 +417,7 @@ fn the_diagonal_is_that_of_the_operator() {
             for c in 0..3 {
                 let mut unit = vec![[0.0; 3]; n];
                 unit[site][c] = 1.0;
-                let entry = applied(&*m.operator, &unit)[site][c];
+                let entry = applied(m.operator, &unit)[site][c];
                 assert!(
                     (entry - diagonal[site][c]).abs() < 1e-12 * largest(&diagonal),
                     "{} {site} {c}",
@@ -290,7 +430,7 @@ fn the_diagonal_is_that_of_the_operator() {
 
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
-    for m in models() {
+    for m in &*MODELS {
         let solved = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
@@ -300,7 +440,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
                 let mut u = random_field(m.positions.len(), 7);
                 let mut held = Held::none(u.len());
                 (0..40).for_each(|s| (0..3).for_each(|c| held.hold(s, c)));
-                let operator = Shared(&*m.operator);
+                let operator = Shared(m.operator);
                 let jacobi = Jacobi::new(&Constrained {
                     inner: &operator,
                     held: &held,
@@ -323,6 +463,130 @@ fn results_do_not_depend_on_the_number_of_threads() {
             })
         };
         assert_eq!(solved(1), solved(3), "{}", m.name);
+    }
+}
+
+#[test]
+fn energies_are_never_negative() {
+    for m in &*MODELS {
+        for seed in 10..14 {
+            let u = random_field(m.positions.len(), seed);
+            let twice = dot(&u, &applied(m.operator, &u));
+            let energy = (m.energy)(&u);
+            assert!(energy > 0.0, "{}: {energy}", m.name);
+            assert!(
+                (twice / energy / 2.0 - 1.0).abs() < 1e-10,
+                "{}: {twice} {energy}",
+                m.name
+            );
+        }
+    }
+}
+
+/// Rounded coefficients do not sum to zero; differences of what is equal do, exactly.
+#[test]
+fn single_precision_is_the_double_rounded_and_a_translation_pulls_at_nothing() {
+    for m in &*MODELS {
+        let x = random_field(m.positions.len(), 8);
+        let exact = applied(m.operator, &x);
+        let x32: Vec<[f32; 3]> = x.iter().map(|x| x.map(|v| v as f32)).collect();
+        let single = (m.single)(&x32);
+        let gaps = single.iter().flatten().zip(exact.iter().flatten());
+        let worst = gaps.fold(0.0f64, |m, (s, e)| m.max((f64::from(*s) - e).abs()));
+        // Measured: at most 4e-7.
+        assert!(
+            worst < 2e-6 * largest(&exact),
+            "{}: {worst:e} of {:e}",
+            m.name,
+            largest(&exact)
+        );
+        let moved = (m.single)(&vec![[1.1f32, -0.7, 123.4]; x.len()]);
+        assert!(moved.iter().flatten().all(|f| *f == 0.0), "{}", m.name);
+    }
+}
+
+/// Rows equal columns, and both the operator: what multigrid reads is what conjugate gradients apply.
+#[test]
+fn rows_of_blocks_are_the_operators_and_symmetric() {
+    for m in &*MODELS {
+        let Some(rows) = m.coarsen else { continue };
+        let n = m.positions.len();
+        let x = random_field(n, 9);
+        let exact = applied(m.operator, &x);
+        let scale = largest(&exact);
+        let mut blocks = HashMap::new();
+        let mut next = 0;
+        rows.each_row(0..n, &mut |site, columns, row| {
+            assert_eq!(site, next, "{}", m.name);
+            next += 1;
+            let reach = rows.reach(site..site + 1);
+            let mut sum = [0.0; 3];
+            for (&column, block) in columns.iter().zip(row) {
+                assert!(reach.contains(&(column as usize)), "{}", m.name);
+                blocks.insert((site as u32, column), *block);
+                for a in 0..3 {
+                    let products = (0..3).map(|b| f64::from(block[a][b]) * x[column as usize][b]);
+                    sum[a] += products.sum::<f64>();
+                }
+            }
+            let off = (0..3).fold(0.0f64, |m, a| m.max((sum[a] - exact[site][a]).abs()));
+            assert!(
+                off < 2e-6 * scale,
+                "{} site {site}: {off:e} of {scale:e}",
+                m.name
+            );
+        });
+        assert_eq!(next, n, "{}", m.name);
+        for ((i, j), block) in &blocks {
+            let other = blocks[&(*j, *i)];
+            let off = (0..9).map(|k| (block[k / 3][k % 3] - other[k % 3][k / 3]).abs());
+            let size = block.iter().flatten().fold(0.0f32, |m, v| m.max(v.abs()));
+            let off = off.fold(0.0, f32::max);
+            assert!(off <= 1e-6 * size, "{}: {block:?} {other:?}", m.name);
+        }
+        let third = n / 3..2 * n / 3;
+        let mut part = vec![[0.0; 3]; third.len()];
+        rows.rows_f64(third.clone(), &x, &mut part);
+        assert_eq!(part, exact[third], "{}", m.name);
+    }
+}
+
+/// `xᵀ A x` is at most the bound times `xᵀ D x`, `D` the blocks of the diagonal.
+#[test]
+fn eigenvalues_stay_below_their_bound() {
+    for m in &*MODELS {
+        let Some(rows) = m.coarsen else { continue };
+        let n = m.positions.len();
+        let mut x = random_field(n, 12);
+        let mut ratio = 0.0;
+        // Iterations towards the largest eigenvalue of the operator scaled by its plain diagonal.
+        let mut diagonal = vec![[0.0; 3]; n];
+        m.operator.diagonal(&mut diagonal);
+        for _ in 0..50 {
+            let y = applied(m.operator, &x);
+            let mut own = 0.0;
+            rows.each_row(0..n, &mut |site, columns, blocks| {
+                let diagonal = columns.iter().position(|c| *c as usize == site);
+                let Some(at) = diagonal else { return };
+                for k in 0..9 {
+                    own += x[site][k / 3] * f64::from(blocks[at][k / 3][k % 3]) * x[site][k % 3];
+                }
+            });
+            ratio = dot(&x, &y) / own;
+            let scaled = |(y, d): (&[f64; 3], &[f64; 3])| {
+                std::array::from_fn(|c| if d[c] > 0.0 { y[c] / d[c] } else { 0.0 })
+            };
+            x = y.iter().zip(&diagonal).map(scaled).collect();
+            let size = largest(&x).recip();
+            x.iter_mut().flatten().for_each(|v| *v *= size);
+        }
+        let bound = rows.eigenvalue_bound();
+        assert!(ratio <= bound, "{}: {ratio} above {bound}", m.name);
+        assert!(
+            ratio > 0.4 * bound,
+            "{}: {ratio}, and {bound} is idle",
+            m.name
+        );
     }
 }
 

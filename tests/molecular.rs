@@ -9,7 +9,7 @@ mod history;
 mod limits;
 mod refusals;
 mod repeated_modes;
-mod stopped;
+mod resume;
 mod thermal_stress;
 mod turned;
 
@@ -364,7 +364,7 @@ fn linear_temperatures_bend_a_free_body_without_stress() {
 #[test]
 fn transient_heat_follows_its_series() {
     use bonepd_ct::scene::Physics;
-    use bonepd_ct::scene::continuum_molecular::conduction::Transient;
+    use bonepd_ct::scene::continuum_molecular::conduction::TimeStepper;
     use bonepd_ct::scene::continuum_molecular::setup::Setup;
     let text = "title = 'square'
         [geometry.rectangle]
@@ -383,10 +383,10 @@ fn transient_heat_follows_its_series() {
     };
     let setup = Setup::new(&scene.setting, model, &Inputs::default()).unwrap();
     let (body, _) = setup
-        .conductor(model, model.conduction.as_ref().unwrap())
+        .conductor(model, model.problem.conduction().unwrap())
         .unwrap();
     let step = 2e-3;
-    let mut transient = Transient::new(&scene.setting, model, &setup, body, 4.0, step).unwrap();
+    let mut transient = TimeStepper::new(&scene.setting, model, &setup, body, 4.0, step).unwrap();
     let pi = std::f64::consts::PI;
     // Two terms of the series of an insulated bar of length 1, x from its left end; D = K/C = 0.5.
     let series = |x: f64, t: f64| {

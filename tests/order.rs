@@ -144,7 +144,7 @@ fn lattice_error(structure: Structure, n: usize) -> f64 {
     };
     let sites = build(&block(n), &case, Axis::Z, 0.0).unwrap();
     let moduli = Moduli::new(structure, case.lp_mm, YOUNG_MPA, POISSON).unwrap();
-    let model = Lattice::new(&sites, moduli);
+    let model = Lattice::new(sites.clone(), moduli);
     let at: Vec<_> = sites
         .indices
         .iter()

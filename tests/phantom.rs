@@ -152,3 +152,49 @@ fn the_sample_scans_come_from_their_commands() {
         );
     }
 }
+
+#[test]
+fn a_body_is_seen_by_partial_volumes_and_finer_voxels_show_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let body = |out: &str, spacing: &str, more: &[&str]| {
+        let mut args = vec!["phantom", "-o", out, "--size-mm", "1", "--bvtv", "0.25"];
+        args.extend([
+            "--spacing-mm",
+            spacing,
+            "--body",
+            "foam",
+            "--cell-mm",
+            "0.5",
+        ]);
+        args.extend(["--broken", "0.2", "--json"]);
+        args.extend(more);
+        run(&args)
+    };
+    let volume = |spacing: &str| {
+        let (code, stdout, stderr) = body(&at(&format!("{spacing}.nii.gz")), spacing, &[]);
+        assert_eq!(code, 0, "{stderr}");
+        json(&stdout)["bv_tv"].as_f64().unwrap()
+    };
+    let (coarse, fine) = (volume("0.05"), volume("0.025"));
+    // Breaks take bone away; the middles of voxels are a count of the volume.
+    assert!(
+        fine < 0.25 && (coarse / fine - 1.0).abs() < 0.03,
+        "{coarse} {fine}"
+    );
+    // No noise: greys are shares of bone, and all between the two values.
+    let (_, stdout, _) = run(&["info", &at("0.05.nii.gz"), "--json"]);
+    let info = json(&stdout);
+    assert_eq!(info["grey_min"].as_f64(), Some(-1000.0), "{info}");
+    assert_eq!(info["grey_max"].as_f64(), Some(1400.0), "{info}");
+    for more in [
+        vec!["--thickness-mm", "0.2"],
+        vec!["--debris", "1"],
+        vec!["--fillet", "3"],
+        vec!["--body", "sponge"],
+    ] {
+        let (code, _, stderr) = body(&at("no.nii.gz"), "0.05", &more);
+        assert_eq!(code, 2, "{more:?} {stderr}");
+    }
+    assert!(!dir.path().join("no.nii.gz").exists());
+}

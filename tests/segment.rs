@@ -1,4 +1,4 @@
-//! `segment` through the built program: the real stack where it is at hand, bad input everywhere.
+//! `segment` through the built program: the real stack (on request), bad input everywhere.
 
 use crate::cli::run;
 use bonepd_ct::grid::Grid;
@@ -6,14 +6,22 @@ use bonepd_ct::image::nifti;
 use bonepd_ct::volume::Volume;
 use std::path::{Path, PathBuf};
 
-/// 200 slices of real bone, not part of the repository.
-pub fn shared_stack() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lhdl_3155_D_4_bc");
-    if path.is_dir() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not here", path.display());
-    None
+/// Folder of the 200 slices of real bone (LHDL 3155 D 4 bc), which are not part of the repository. Tests that read it are
+/// ignored by default.
+///
+/// # Panics
+/// If it is not where `BONEPD_STACK` says.
+pub fn real_stack() -> PathBuf {
+    let path = match std::env::var_os("BONEPD_STACK") {
+        Some(path) => PathBuf::from(path),
+        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lhdl_3155_D_4_bc"),
+    };
+    assert!(
+        path.is_dir(),
+        "{} is no folder: set BONEPD_STACK to the folder of the slices",
+        path.display()
+    );
+    path
 }
 
 fn text(path: &Path) -> &str {
@@ -31,8 +39,9 @@ fn bar(path: &Path) {
 }
 
 #[test]
+#[ignore = "needs the real stack (BONEPD_STACK)"]
 fn the_real_stack_gives_the_published_count_of_bone_voxels() {
-    let Some(stack) = shared_stack() else { return };
+    let stack = real_stack();
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
     let (code, stdout, stderr) = run(&[

@@ -1,20 +1,22 @@
 //! Hard cases: what each came to, how far its stated error was off, and how many mechanisms it has.
 //! `cargo test --release stability_cases -- --nocapture` prints the table.
 
-use crate::made::specimen;
-use crate::stopped::textbook;
+use crate::specimens::specimen;
+use crate::stopping::textbook;
 use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::Operator;
-use bonepd_ct::operator::held::Held;
 use bonepd_ct::operator::probe::probe;
 use bonepd_ct::operator::sparse::Sparse;
 use bonepd_ct::physics::hex8::element::Integration;
-use bonepd_ct::physics::hex8::graded::Graded;
-use bonepd_ct::pipeline::apparent::bricks::{Bricks, Keep};
-use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
+use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
+use bonepd_ct::pipeline::apparent::discretisation::Prepared;
+use bonepd_ct::pipeline::apparent::solve_lattice;
+use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::solved::Solved;
-use bonepd_ct::pipeline::apparent::voxel_fe::{grid_places, solve_voxels, supports};
+use bonepd_ct::pipeline::apparent::tissue::Tissue;
+use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
+use bonepd_ct::pipeline::apparent::voxel_fe::supports;
 use bonepd_ct::pipeline::apparent::{Ends, SolveParams};
 use bonepd_ct::pipeline::lattice::{Boundary, Case as LatticeCase, Structure};
 use bonepd_ct::solver::amg::{Amg, AmgParams};
@@ -63,9 +65,9 @@ fn poisson(poisson: f64) -> SolveParams {
     }
 }
 
-/// The list. Each is small enough that a run to 1e-12 and a factorisation take moments.
+/// Hard cases. Each is small enough that a run to 1e-12 and a factorisation take moments.
 fn cases() -> Vec<Case> {
-    use Boundary::{Firm, Floppy, Graded};
+    use Boundary::{Connected, Firm, Floppy};
     use Model::{Lattice, Voxels};
     use Structure::{Bcc, Sc};
     let mut cases = Vec::new();
@@ -99,7 +101,7 @@ fn cases() -> Vec<Case> {
             );
         }
     }
-    for boundary in [Firm, Floppy, Graded] {
+    for boundary in [Firm, Floppy, Connected] {
         add(
             "struts 2 voxels thick",
             thin(),
@@ -295,9 +297,9 @@ fn solve(case: &Case, params: &SolveParams) -> Result<Solved, bonepd_ct::error::
 }
 
 fn outcome(case: &Case) -> Outcome {
-    // ConnectedSites of graded lattices share places on the grid, which the count cannot tell apart.
+    // Sites of connected lattices share places on the grid, which the count cannot tell apart.
     let counted = SolveParams {
-        mechanisms: !matches!(case.model, Model::Lattice(_, Boundary::Graded, _)),
+        mechanisms: !matches!(case.model, Model::Lattice(_, Boundary::Connected, _)),
         ..case.params.clone()
     };
     let solved = solve(case, &counted).unwrap();
@@ -387,12 +389,18 @@ fn a_direct_solution_is_the_iterated_one() {
             tolerance: 1e-12,
             ..poisson(nu)
         };
-        let model = Bricks::new(&specimen, &params, Keep::BetweenGrips).unwrap();
+        let tissue = &Tissue::of(&specimen, &params).unwrap();
+        let prepared = Prepared {
+            specimen: &specimen,
+            tissue,
+        };
+        let model = Bricks::new(prepared, &params, Keep::BetweenGrips).unwrap();
         let mesh = model.mesh();
         assert!(!mesh.is_empty());
         let grips = Planes::within(&mesh.grid, Axis::Z, 0.0).unwrap();
         let length = mesh.grid.size_mm()[2];
-        let (held, mut u) = supports(mesh, grips, &params, params.strain * length);
+        let held = supports::held(mesh, grips, &params);
+        let mut u = supports::bar(mesh, grips, params.strain * length);
         for (node, u) in u.iter_mut().enumerate() {
             (0..3)
                 .filter(|&c| !held.is_held(node, c))
@@ -400,7 +408,7 @@ fn a_direct_solution_is_the_iterated_one() {
         }
         let mut force = vec![[0.0; 3]; mesh.len()];
         model.apply(&u, &mut force);
-        let probed = probe(&model, &held, &grid_places(mesh), 1);
+        let probed = probe(&model, &held, &supports::grid_places(mesh), 1);
         let mut x: Vec<f64> = probed.unknowns.iter().map(|&(n, c)| -force[n][c]).collect();
         let order: Vec<usize> = (0..x.len()).collect();
         let mut llt = DirectLlt::new(&probed.matrix, &order).unwrap();
@@ -452,9 +460,10 @@ fn contrast(soft: f32) -> (usize, f64, f64) {
     let grips = Planes::within(&grid, Axis::Z, 0.0).unwrap();
     let mesh = VoxelMesh::new(grid, bone, |_| true, grips).unwrap();
     let length = grid.size_mm()[2];
-    let (held, start): (Held, _) = supports(&mesh, grips, &poisson(0.3), length);
+    let held = supports::held(&mesh, grips, &poisson(0.3));
+    let start = supports::bar(&mesh, grips, length);
     let factor = |e: usize| if bone[e] == 1 { 1.0 } else { soft };
-    let model = Graded::new(mesh, 1000.0, 0.3, Integration::Full, factor);
+    let model = Heterogeneous::new(mesh, 1000.0, 0.3, Integration::Full, factor);
     let amg = Amg::new(&model, &held, &AmgParams::new(grid.spacing_mm));
     let run = |energy_tolerance| {
         let params = CgParams {

@@ -1,8 +1,8 @@
 //! Voxel finite elements against closed forms, and the multigrid that solves them.
 
-use crate::made::specimen;
+use crate::specimens::specimen;
+use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::solved::Solved;
-use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
 use bonepd_ct::pipeline::apparent::{Ends, Load, SolveParams};
 use bonepd_ct::solver::cg::Ended;
 use bonepd_ct::volume::Specimen;

@@ -4,6 +4,7 @@ mod completions;
 mod info;
 mod lattice;
 mod phantom;
+mod phantom_body;
 mod report;
 mod run;
 mod scene;

@@ -4,6 +4,7 @@ use super::{print_json, words};
 use bonepd_ct::command::Outcome;
 use bonepd_ct::error::Result;
 use bonepd_ct::grid::Axis;
+use bonepd_ct::image::array::headerless::Contents;
 use bonepd_ct::image::calibration::GreyUnit;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::segment::{Align, AlignBox, SegmentParams, Voi};
@@ -32,6 +33,10 @@ pub struct SegmentSettings {
     /// the patient or the world where the file tells how it lies in it, else as stored
     #[arg(long, value_name = "MM[,MM,MM]", value_parser = words::sizes)]
     spacing: Option<[f64; 3]>,
+    /// What is in a file of voxels without a header (.raw, .vol), as 512,512,300,uint16; add `be` for big-endian numbers
+    /// (uint16be), and the bytes before the first voxel (512,512,300,uint16,1024)
+    #[arg(long, value_name = "NX,NY,NZ,TYPE[,SKIP]")]
+    raw: Option<Contents>,
     /// Grey values of Scanco files (AIM, ISQ), and so the threshold: as stored (native), in HU, or in mg HA/cm³; hu-where-known
     /// leaves files without a calibration as they are, where hu refuses them [default: native, with a warning]
     #[arg(long, value_name = "UNIT", value_parser = words::choice::<GreyUnit>(&["native", "hu", "mgha", "hu-where-known"]))]
@@ -53,7 +58,7 @@ pub struct SegmentSettings {
     gaussian: Option<f64>,
     /// Volume of interest: box, cylinder (the largest that fits), cylinder:D or cylinder:D,X,Y in mm, or a mask file
     /// on the scan's grid [default: box]
-    #[arg(long, value_name = "VOI", value_parser = words::voi)]
+    #[arg(long, value_name = "VOI", value_parser = words::voi())]
     voi: Option<Voi>,
     /// Keep voxels first:end along each axis (x, y, z as `info` prints them); the end is not included
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = words::crop)]
@@ -111,6 +116,7 @@ impl SegmentSettings {
         params.no_grey |= self.no_grey;
         params.blur_voxels = self.blur_voxels.or(params.blur_voxels);
         params.spacing_mm = self.spacing.or(params.spacing_mm);
+        params.raw = self.raw.or(params.raw);
         params.units = self.units.or(params.units);
         params.lower = self.lower.or(params.lower);
         params.upper = self.upper.or(params.upper);

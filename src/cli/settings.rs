@@ -4,7 +4,7 @@ use super::words;
 use bonepd_ct::error::{Error, Result};
 use bonepd_ct::physics::material::{Law, Material};
 use bonepd_ct::pipeline::apparent::SolveParams;
-use bonepd_ct::pipeline::lattice::{Boundary, LatticeParams, Structure};
+use bonepd_ct::pipeline::lattice::{BoundaryWord, LatticeParams, Structure};
 use clap::Args;
 
 /// What bone is made of.
@@ -60,9 +60,11 @@ pub struct LatticeSettings {
     /// Lattice parameters in mm, comma-separated [default: 0.06,0.08,0.10,0.12]
     #[arg(long, value_name = "MM", value_delimiter = ',', value_parser = words::positive)]
     lp: Vec<f64>,
-    /// How the lattice meets the bone's surface, comma-separated [default: firm,floppy]
-    #[arg(long, value_delimiter = ',', value_parser = words::choice::<Boundary>(&["firm", "floppy", "graded"]))]
-    boundary: Vec<Boundary>,
+    /// How the lattice meets the bone's surface, comma-separated: firm, floppy, connected (sc: a site per connected component
+    /// of bone in a cell), weighted (bcc, fcc: sites weighted by the bone fraction of their cell). graded, the older word,
+    /// means connected on sc and weighted on bcc and fcc; result files say graded for both [default: firm,floppy]
+    #[arg(long, value_delimiter = ',', value_parser = words::choice::<BoundaryWord>(&["firm", "floppy", "connected", "weighted", "graded"]))]
+    boundary: Vec<BoundaryWord>,
     /// Shift the lattice by this many mm along x, y, z
     #[arg(long, value_name = "X,Y,Z", value_parser = words::triple, allow_hyphen_values = true)]
     registration: Option<[f64; 3]>,

@@ -39,7 +39,7 @@ pub struct SolveArgs {
 #[command(next_help_heading = "Solve")]
 pub struct SolveSettings {
     /// lattice (the lattice element method), or voxel-fe (one hexahedron per bone voxel) [default: lattice]
-    #[arg(long, value_parser = words::choice::<Method>(&["lattice", "voxel-fe"]))]
+    #[arg(long, value_parser = words::choice::<Method>(Method::WORDS))]
     method: Option<Method>,
     #[command(flatten)]
     tissue: TissueSettings,

@@ -2,7 +2,7 @@
 
 use bonepd_ct::physics::material::{Label, Law};
 use bonepd_ct::pipeline::segment::{Align, Voi};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as WordError, StrDeserializer};
 
@@ -142,8 +142,15 @@ pub fn align(word: &str) -> Result<Align, String> {
     }
 }
 
-/// `box`, `cylinder`, `cylinder:D`, `cylinder:D,X,Y` (mm), or a mask file.
-pub fn voi(word: &str) -> Result<Voi, String> {
+/// `box`, `cylinder`, `cylinder:D`, `cylinder:D,X,Y` (mm), or a mask file, whose name may be no text.
+pub fn voi() -> impl TypedValueParser<Value = Voi> {
+    OsStringValueParser::new().try_map(|word| match word.to_str() {
+        Some(text) => shape(text),
+        None => Ok(Voi::Mask(word.into())),
+    })
+}
+
+fn shape(word: &str) -> Result<Voi, String> {
     if word == "box" {
         return Ok(Voi::Box);
     }
@@ -199,18 +206,21 @@ mod tests {
 
     #[test]
     fn a_volume_of_interest_is_a_shape_or_a_file() {
-        assert_eq!(voi("box"), Ok(Voi::Box));
-        let shape = |diameter_mm, center_mm| {
+        assert_eq!(shape("box"), Ok(Voi::Box));
+        let cylinder = |diameter_mm, center_mm| {
             Ok(Voi::Cylinder {
                 diameter_mm,
                 center_mm,
             })
         };
-        assert_eq!(voi("cylinder"), shape(None, None));
-        assert_eq!(voi("cylinder:5"), shape(Some(5.0), None));
-        assert_eq!(voi("cylinder:5,1,2"), shape(Some(5.0), Some([1.0, 2.0])));
-        assert_eq!(voi("voi.nii.gz"), Ok(Voi::Mask("voi.nii.gz".into())));
-        assert!(voi("cylinder:0").is_err());
+        assert_eq!(shape("cylinder"), cylinder(None, None));
+        assert_eq!(shape("cylinder:5"), cylinder(Some(5.0), None));
+        assert_eq!(
+            shape("cylinder:5,1,2"),
+            cylinder(Some(5.0), Some([1.0, 2.0]))
+        );
+        assert_eq!(shape("voi.nii.gz"), Ok(Voi::Mask("voi.nii.gz".into())));
+        assert!(shape("cylinder:0").is_err());
     }
 
     #[test]

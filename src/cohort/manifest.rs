@@ -1,5 +1,6 @@
-//! Owns manifests: a CSV with one line per scan, its path and what is special about it. Cells are divided by commas, or, as
-//! spreadsheets and R's `write.csv2` have it where the comma is the decimal mark, by semicolons or tabs.
+//! Owns manifests: a CSV or TSV with one line per scan, its path and what is special about it. Cells are divided by commas, or,
+//! as spreadsheets and R's `write.csv2` have it where the comma is the decimal mark, by semicolons or tabs. Excel's first line
+//! `sep=;` and empty columns at the end are passed over.
 
 use crate::cohort::job::ScanJob;
 use crate::error::{Error, Result};
@@ -46,29 +47,43 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
             "save it as UTF-8 (in Excel: Save as, CSV UTF-8; in R: fileEncoding = \"UTF-8\")",
         ));
     }
-    let delimiter = delimiter(&text);
+    let (said, rows) = without_separator_line(&text);
+    let delimiter = said.unwrap_or_else(|| delimiter(rows));
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter)
+        .flexible(true)
         .trim(csv::Trim::All)
-        .from_reader(&text[..]);
+        .from_reader(rows);
     let header = reader
         .headers()
         .map_err(|e| wrong(format!("cannot be read: {e}")))?
         .clone();
+    let header = without_empty_end(&header);
     check_header(&header).map_err(wrong)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut jobs = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| wrong(format!("cannot be read: {e}")))?;
+        let line = record.position().map_or(0, csv::Position::line) + u64::from(said.is_some());
+        if let Some(more) = record
+            .iter()
+            .skip(header.len())
+            .find(|cell| !cell.is_empty())
+        {
+            return Err(wrong(format!(
+                "line {line}: has more cells than the header has columns (`{more}`): put quotes around cells that hold a divider"
+            )));
+        }
+        if record.iter().all(str::is_empty) {
+            continue;
+        }
         let cell = |column: &str| {
             let at = header.iter().position(|name| name == column)?;
             record
                 .get(at)
                 .filter(|cell| !cell.is_empty() && *cell != "NA")
         };
-        let decimal_comma = delimiter != b',';
-        let line = record.position().map_or(0, csv::Position::line);
-        let job = job(cell, decimal_comma, folder, params)
+        let job = job(cell, delimiter, folder, params)
             .map_err(|found| wrong(format!("line {line}: {found}")))?;
         job.segment.check().map_err(|e| of_line(path, line, e))?;
         jobs.push(job);
@@ -79,7 +94,7 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
     Ok(jobs)
 }
 
-/// A setting that cannot be used, told with the line of the manifest that gives it.
+/// A setting that cannot be used, with the line of the manifest that gives it.
 fn of_line(path: &Path, line: u64, e: Error) -> Error {
     match e {
         Error::Setting { key, found, advice } => {
@@ -87,6 +102,33 @@ fn of_line(path: &Path, line: u64, e: Error) -> Error {
         }
         other => other,
     }
+}
+
+/// What Excel's `sep=` in the first line says, and the text after it.
+fn without_separator_line(text: &[u8]) -> (Option<u8>, &[u8]) {
+    let bare = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    let bare = bare.strip_prefix(b"\"").unwrap_or(bare);
+    let Some(rest) = bare.strip_prefix(b"sep=").or(bare.strip_prefix(b"SEP=")) else {
+        return (None, text);
+    };
+    let end = rest
+        .iter()
+        .position(|b| *b == b'\n')
+        .map_or(rest.len(), |at| at + 1);
+    match rest.first() {
+        Some(&divider @ (b',' | b';' | b'\t' | b'|')) => (Some(divider), &rest[end..]),
+        _ => (None, text),
+    }
+}
+
+/// Spreadsheets save empty columns that once held something.
+fn without_empty_end(header: &csv::StringRecord) -> csv::StringRecord {
+    let names: Vec<&str> = header.iter().collect();
+    let end = names
+        .iter()
+        .rposition(|name| !name.is_empty())
+        .map_or(0, |last| last + 1);
+    csv::StringRecord::from(&names[..end])
 }
 
 /// What divides the cells of the header.
@@ -119,22 +161,13 @@ fn check_header(header: &csv::StringRecord) -> std::result::Result<(), String> {
 
 fn job<'a>(
     cell: impl Fn(&str) -> Option<&'a str>,
-    decimal_comma: bool,
+    delimiter: u8,
     folder: &Path,
     params: &SegmentParams,
 ) -> std::result::Result<ScanJob, String> {
     let number = |column: &str| {
-        let Some(word) = cell(column) else {
-            return Ok(None);
-        };
-        let parsed = match decimal_comma {
-            true => word.replace(',', ".").parse::<f64>(),
-            false => word.parse(),
-        };
-        match parsed {
-            Ok(v) if v.is_finite() => Ok(Some(v)),
-            _ => Err(format!("expected a number in `{column}`, found `{word}`")),
-        }
+        let word = cell(column);
+        word.map(|word| parsed(word, column, delimiter)).transpose()
     };
     let input = folder.join(cell("path").ok_or("no path")?);
     let mut segment = params.clone();
@@ -151,7 +184,9 @@ fn job<'a>(
         None | Some("false" | "FALSE" | "0" | "no") => {}
         Some(other) => return Err(format!("expected true or false in `otsu`, found `{other}`")),
     }
-    segment.spacing_mm = number("spacing_mm")?.map(|h| [h; 3]).or(segment.spacing_mm);
+    if let Some(word) = cell("spacing_mm") {
+        segment.spacing_mm = Some(spacing(word, delimiter)?);
+    }
     segment.gaussian_voxels = number("gaussian_voxels")?.unwrap_or(segment.gaussian_voxels);
     let text = |column| cell(column).map(str::to_owned);
     Ok(ScanJob {
@@ -161,6 +196,52 @@ fn job<'a>(
         group: text("group"),
         subject: text("subject"),
     })
+}
+
+/// A number in the spelling of the file: with a decimal comma beside semicolons and tabs.
+fn parsed(word: &str, column: &str, delimiter: u8) -> std::result::Result<f64, String> {
+    // 1.200 beside semicolons is 1200 in the countries that save so, and 1.2 in all others.
+    let (head, tail) = word.split_once('.').unwrap_or((word, ""));
+    let digits = |text: &str| text.bytes().all(|c| c.is_ascii_digit());
+    let head = head.trim_start_matches(['-', '+']);
+    if delimiter == b';'
+        && tail.len() == 3
+        && digits(tail)
+        && digits(head)
+        && !head.starts_with('0')
+        && !head.is_empty()
+    {
+        return Err(format!(
+            "`{word}` in `{column}` may mean {head}{tail} or {head}.{}: beside semicolons a point can divide thousands. Write it without one, or with a decimal comma",
+            tail.trim_end_matches('0')
+        ));
+    }
+    let number = match delimiter {
+        b',' => word.parse::<f64>(),
+        _ => word.replace(',', ".").parse(),
+    };
+    match number {
+        Ok(v) if v.is_finite() => Ok(v),
+        _ => Err(format!("expected a number in `{column}`, found `{word}`")),
+    }
+}
+
+/// One voxel size for all axes, or three: divided by commas (quoted), spaces, semicolons or `x`.
+fn spacing(word: &str, delimiter: u8) -> std::result::Result<[f64; 3], String> {
+    let decimal_comma = delimiter != b',' && !word.contains('.');
+    let divides = |c: char| c.is_whitespace() || "x×;".contains(c) || c == ',' && !decimal_comma;
+    let parts: Vec<&str> = word
+        .split(divides)
+        .filter(|part| !part.is_empty())
+        .collect();
+    let number = |word: &str| parsed(word, "spacing_mm", delimiter);
+    match parts[..] {
+        [one] => Ok([number(one)?; 3]),
+        [x, y, z] => Ok([number(x)?, number(y)?, number(z)?]),
+        _ => Err(format!(
+            "expected one voxel size or three (x, y, z) in `spacing_mm`, found `{word}`"
+        )),
+    }
 }
 
 #[cfg(test)]
@@ -225,6 +306,54 @@ mod tests {
         }
         let words = read_text("path;lower\na.nii;1.200,5\n").unwrap_err();
         assert!(words.to_string().contains("found `1.200,5`"), "{words}");
+    }
+
+    #[test]
+    fn files_are_read_as_people_save_them() {
+        for (text, spacing) in [
+            ("sep=;\r\npath;spacing_mm\r\na.nii;0,0195\r\n", [0.0195; 3]),
+            (
+                "\u{feff}sep=,\npath,spacing_mm\na.nii,0.0195\n",
+                [0.0195; 3],
+            ),
+            ("path,spacing_mm,,\na.nii,0.0195,,\n,,,\n", [0.0195; 3]),
+            (
+                "path,spacing_mm\na.nii,\"0.02,0.02,0.04\"\n",
+                [0.02, 0.02, 0.04],
+            ),
+            (
+                "path,spacing_mm\na.nii,0.02 0.02 0.04\n",
+                [0.02, 0.02, 0.04],
+            ),
+            (
+                "path;spacing_mm\na.nii;0,02 x 0,02 x 0,04\n",
+                [0.02, 0.02, 0.04],
+            ),
+            ("path\tspacing_mm\na.nii\t0.02\n", [0.02; 3]),
+        ] {
+            let jobs = read_text(text).unwrap();
+            assert_eq!(
+                (jobs.len(), jobs[0].segment.spacing_mm),
+                (1, Some(spacing)),
+                "{text:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_may_mean_two_numbers_is_refused() {
+        for word in ["1.200", "-1.200", "12.000"] {
+            let words = read_text(&format!("path;lower\na.nii;{word}\n")).unwrap_err();
+            assert!(words.to_string().contains("may mean"), "{words}");
+        }
+        let lower = |text: &str| read_text(text).unwrap()[0].segment.lower;
+        assert_eq!(lower("path;lower\na.nii;0.195\n"), Some(0.195));
+        assert_eq!(lower("path;lower\na.nii;1.25\n"), Some(1.25));
+        assert_eq!(lower("path\tlower\na.nii\t1.200\n"), Some(1.2));
+        let words = read_text("path,lower\na.nii,0,0195\n")
+            .unwrap_err()
+            .to_string();
+        assert!(words.contains("line 2: has more cells"), "{words}");
     }
 
     #[test]

@@ -36,12 +36,25 @@ pub struct Resources {
 }
 
 /// What became of a scan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    Done,
+    #[serde(rename = "not converged")]
+    NotConverged,
+    #[serde(rename = "error not met")]
+    ErrorNotMet,
+    Failed,
+    /// In a dry run.
+    Planned,
+}
+
+/// One scan of a run.
 #[derive(Debug, Clone, Serialize)]
 pub struct ScanResult {
     pub scan: String,
     pub input: PathBuf,
-    /// `done`, `not converged`, `error not met`, `failed`, or `planned` in a dry run.
-    pub state: &'static str,
+    pub state: State,
     pub error: Option<String>,
     pub rows: usize,
     pub estimate: Estimate,
@@ -73,12 +86,16 @@ pub fn cohort(
     let estimates: Vec<Estimate> = jobs
         .iter()
         .map(|job| estimate(&job.input, job.segment.spacing_mm, recipe))
-        .collect();
+        .collect::<Result<_>>()?;
     if session.dry_run {
         let results = plan(recipe, &jobs, &estimates, out, session);
         return Ok((outcome(&results), results));
     }
     atomic::sweep(out);
+    let session = &Session {
+        shares_process: resources.jobs.min(jobs.len()) > 1,
+        ..session.clone()
+    };
     let run = Run {
         recipe,
         out,
@@ -284,13 +301,13 @@ fn result(
         target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
     };
     let (state, error, rows) = match solved {
-        Some(Ok(rows)) if missed(&rows) => ("error not met", None, rows.len()),
+        Some(Ok(rows)) if missed(&rows) => (State::ErrorNotMet, None, rows.len()),
         Some(Ok(rows)) if rows.iter().any(|row| row.converged() == Some(false)) => {
-            ("not converged", None, rows.len())
+            (State::NotConverged, None, rows.len())
         }
-        Some(Ok(rows)) => ("done", None, rows.len()),
-        Some(Err(e)) => ("failed", Some(e.to_string()), 0),
-        None => ("planned", None, 0),
+        Some(Ok(rows)) => (State::Done, None, rows.len()),
+        Some(Err(e)) => (State::Failed, Some(e.to_string()), 0),
+        None => (State::Planned, None, 0),
     };
     ScanResult {
         scan: job.name.clone(),
@@ -303,13 +320,12 @@ fn result(
 }
 
 fn outcome(results: &[ScanResult]) -> Outcome {
-    let in_state = |state: &'static str| results.iter().filter(move |r| r.state == state);
-    let failed: Vec<String> = in_state("failed").map(|r| r.scan.clone()).collect();
-    let short = ["not converged", "error not met"];
-    match (
-        failed.is_empty(),
-        short.iter().any(|s| in_state(s).next().is_some()),
-    ) {
+    let in_state = |state: State| results.iter().filter(move |r| r.state == state);
+    let failed: Vec<String> = in_state(State::Failed).map(|r| r.scan.clone()).collect();
+    let short = [State::NotConverged, State::ErrorNotMet]
+        .into_iter()
+        .any(|state| in_state(state).next().is_some());
+    match (failed.is_empty(), short) {
         (false, _) => Outcome::SomeFailed(failed),
         (true, true) => Outcome::NotConverged,
         (true, false) => Outcome::Done,
@@ -359,8 +375,8 @@ fn plan(
         s if s < 5400.0 => format!("{:.0} min", s / 60.0),
         s => format!("{:.1} h", s / 3600.0),
     };
-    let untold = estimates.iter().filter(|e| e.time_s.is_none()).count();
-    let rest = match untold {
+    let unknown = estimates.iter().filter(|e| e.time_s.is_none()).count();
+    let rest = match unknown {
         0 => String::new(),
         n => format!(", and {n} whose time is not known before reading"),
     };

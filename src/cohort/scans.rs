@@ -4,6 +4,7 @@ use crate::cohort::job::ScanJob;
 use crate::cohort::manifest;
 use crate::error::{Error, Result};
 use crate::image::{extent, scan, slices};
+use crate::io::own_files;
 use crate::machine::session::Session;
 use crate::pipeline::segment::SegmentParams;
 use crate::record::specimen;
@@ -69,7 +70,7 @@ fn is_manifest(path: &Path) -> bool {
     path.is_file()
         && path
             .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("csv"))
+            .is_some_and(|e| e.eq_ignore_ascii_case("csv") || e.eq_ignore_ascii_case("tsv"))
 }
 
 /// Names and paths of the scans that `input` is or holds.
@@ -145,7 +146,7 @@ fn descend(
 ) -> Result<()> {
     for path in listing(folder)? {
         let name = format!("{prefix}{}", scan::name(&path));
-        let whole = path.is_file() && scan::is_scan_file(&path);
+        let whole = path.is_file() && scan::is_scan_file(&path) && !own_files::is_result(&path);
         let single_page = slices::is_slice(&path) && !extent::is_stack(&path);
         if whole && !single_page || path.is_dir() && is_one_scan(&path) {
             found.push((name, path));

@@ -6,21 +6,17 @@
 
 use crate::command::estimate;
 use crate::command::ladder::{COARSENED, REFINED, smoothed_again, voxel_fe};
-use crate::command::solve::{in_words, loaded, solve};
+use crate::command::solve::{OpenScan, in_words};
 use crate::error::Result;
 use crate::machine::session::Session;
-use crate::measure::thickness::plate_thickness_mm;
-use crate::pipeline::apparent::SolveParams;
-use crate::pipeline::apparent::resolution::image;
+use crate::pipeline::apparent::{SolveParams, of_voxels};
 use crate::pipeline::lattice::LatticeParams;
-use crate::record::error_target_note::Missed;
-use crate::record::results::Results;
+use crate::record::error_target_note::ErrorTargetNote;
 use crate::result::row::Row;
-use crate::result::shape::{Image, Learnt, of_interpolated, state, surface};
-use crate::volume::Specimen;
+use crate::result::shape::{self, Image, Learnt};
 use std::path::Path;
 
-/// What came of it.
+/// The outcome of `solve --error`.
 pub struct Found {
     /// The rows of all that was tried.
     pub rows: Vec<Row>,
@@ -28,109 +24,125 @@ pub struct Found {
     pub met: bool,
 }
 
-/// Solves the specimen in `dir` until the stated error is below `target` (0.03 is 3 %), and says which row it is. What was
+/// Solves the specimen in `dir` until the stated error is below `target` (0.03 is 3 %), and says which row it is. All that was
 /// tried stands in the results.
 ///
 /// # Errors
-/// As [`solve`].
+/// As [`crate::command::solve::solve`].
 pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session) -> Result<Found> {
-    if !session.dry_run {
-        // Of an earlier target.
-        Results::open(dir, false)?.renote(Missed::take_back)?;
-    }
-    if session.force && !session.dry_run {
-        Results::begin_anew(dir)?;
-    }
-    // Dropped once: redone at every step, each would drop what the one before it solved.
-    let session = &Session {
-        force: false,
-        ..session.clone()
-    };
     let params = SolveParams {
         // A tenth of the whole error is left to the solver.
         tolerance: params.tolerance.min(0.1 * target),
         ..params.clone()
     };
-    let specimen = loaded(dir, &smoothed_again(&params))?;
-    let rows = climb(dir, &specimen, target, &params, session)?;
-    finish(dir, rows, target, session)
+    let mut scan = OpenScan::open(dir, &smoothed_again(&params), false, session)?;
+    if !session.dry_run {
+        // Notes of an earlier target.
+        scan.results().edit_rows(ErrorTargetNote::remove_note)?;
+        if session.force {
+            scan.results().clear()?;
+        }
+    }
+    let rows = Climb {
+        scan: &mut scan,
+        target,
+        params: &params,
+        session,
+    }
+    .climb()?;
+    finish(&mut scan, rows, target, session)
 }
 
-fn climb(
-    dir: &Path,
-    specimen: &Specimen,
+/// One specimen on its way to a target.
+struct Climb<'a> {
+    scan: &'a mut OpenScan,
     target: f64,
-    params: &SolveParams,
-    session: &Session,
-) -> Result<Vec<Row>> {
-    let step = |params: &SolveParams| solve(dir, &LatticeParams::default(), params, session);
-    let fits = |p: &SolveParams| estimate::refuse_what_does_not_fit(specimen, None, p);
-    let native = voxel_fe(params, 1, 1);
-    if let Err(refused) = fits(&native) {
-        for coarse in COARSENED.map(|n| voxel_fe(params, n, 1)) {
-            if fits(&coarse).is_ok() {
-                session.warn(format!("one element a voxel does not fit: {refused}"));
-                return step(&coarse);
+    params: &'a SolveParams,
+    session: &'a Session,
+}
+
+impl Climb<'_> {
+    fn climb(&mut self) -> Result<Vec<Row>> {
+        let native = voxel_fe(self.params, 1, 1);
+        if let Err(refused) = self.fits(&native) {
+            for coarse in COARSENED.map(|n| voxel_fe(self.params, n, 1)) {
+                if self.fits(&coarse).is_ok() {
+                    let words = format!("one element a voxel does not fit: {refused}");
+                    self.session.warn(words);
+                    return self.step(&coarse);
+                }
+            }
+            return Err(refused);
+        }
+        let rows = self.step(&native)?;
+        match self.scan.image() {
+            Image::Grey { blur_voxels } if !self.is_done(&rows) && self.params.material.is_none() => {
+                self.refine(rows, blur_voxels)
+            }
+            _ => Ok(rows),
+        }
+    }
+
+    /// Finer elements of interpolated grey values, after `rows` of one element a voxel.
+    fn refine(&mut self, mut rows: Vec<Row>, blur_voxels: f64) -> Result<Vec<Row>> {
+        let again = self.step(&smoothed_again(self.params))?;
+        for refined in REFINED.map(|n| voxel_fe(self.params, 1, n)) {
+            if let Err(refused) = self.fits(&refined) {
+                let words = format!("finer elements do not fit: {refused}");
+                self.session.warn(words);
+                break;
+            }
+            let mut fine = self.step(&refined)?;
+            if let Some(learnt) = self.learnt(rows.first(), again.first(), fine.first()) {
+                let stated = Some(shape::of_interpolated(blur_voxels, &learnt));
+                fine.iter_mut().for_each(|row| shape::state(row, stated));
+                let keys: Vec<_> = fine.iter().map(|row| row.key.clone()).collect();
+                self.scan.results().edit_rows(|row| {
+                    if keys.contains(&row.key) {
+                        shape::state(row, stated);
+                    }
+                })?;
+            }
+            rows.extend(fine);
+            if self.is_done(&rows) {
+                break;
             }
         }
-        return Err(refused);
+        rows.extend(again);
+        Ok(rows)
     }
-    let mut rows = step(&native)?;
-    let Image::Grey { blur_voxels } = image(specimen) else {
-        return Ok(rows);
-    };
-    let broken = |rows: &[Row]| rows.iter().all(Row::is_disconnected);
-    let done = |rows: &[Row]| !session.dry_run && (meets(rows, target) || broken(rows));
-    if done(&rows) || params.material.is_some() {
-        return Ok(rows);
-    }
-    let again = step(&smoothed_again(params))?;
-    for refined in REFINED.map(|n| voxel_fe(params, 1, n)) {
-        if let Err(refused) = fits(&refined) {
-            session.warn(format!("finer elements do not fit: {refused}"));
-            break;
-        }
-        let mut fine = step(&refined)?;
-        if let Some(learnt) = learnt(specimen, rows.first(), again.first(), fine.first()) {
-            let stated = Some(of_interpolated(blur_voxels, &learnt));
-            fine.iter_mut().for_each(|row| state(row, stated));
-            let keys: Vec<_> = fine.iter().map(|row| row.key.clone()).collect();
-            Results::open(dir, false)?.renote(|row| {
-                if keys.contains(&row.key) {
-                    state(row, stated);
-                }
-            })?;
-        }
-        rows.extend(fine);
-        if done(&rows) {
-            break;
-        }
-    }
-    rows.extend(again);
-    Ok(rows)
-}
 
-/// What one element a voxel, the smoother image and finer elements say together.
-fn learnt(
-    specimen: &Specimen,
-    native: Option<&Row>,
-    again: Option<&Row>,
-    fine: Option<&Row>,
-) -> Option<Learnt> {
-    let one = native?.e_app_mpa()?;
-    let change = |row: Option<&Row>| Some((row?.e_app_mpa()? / one - 1.0).abs());
-    let sensitivity = native?.solved.as_ref()?.threshold_sensitivity;
-    let voxel_mm = specimen.bone.grid.voxel_mm3().cbrt();
-    let thickness = plate_thickness_mm(&specimen.bone)? / voxel_mm;
-    Some(Learnt {
-        surface: surface(sensitivity, thickness),
-        again: change(again)?,
-        refined: change(fine)?,
-    })
+    fn step(&mut self, params: &SolveParams) -> Result<Vec<Row>> {
+        self.scan
+            .solve(&LatticeParams::default(), params, self.session)
+    }
+
+    fn fits(&self, params: &SolveParams) -> Result<()> {
+        estimate::refuse_what_does_not_fit(&of_voxels(), self.scan.prepared(), params)
+    }
+
+    fn is_done(&self, rows: &[Row]) -> bool {
+        let broken = rows.iter().all(Row::is_disconnected);
+        !self.session.dry_run && (broken || meets(rows, self.target))
+    }
+
+    /// What one element a voxel, the smoother image and finer elements say together.
+    fn learnt(&self, one: Option<&Row>, again: Option<&Row>, fine: Option<&Row>) -> Option<Learnt> {
+        let e_app_mpa = one?.e_app_mpa()?;
+        let change = |row: Option<&Row>| Some((row?.e_app_mpa()? / e_app_mpa - 1.0).abs());
+        Some(Learnt {
+            surface: self
+                .scan
+                .surface(one?.solved.as_ref()?.threshold_sensitivity),
+            again: change(again)?,
+            refined: change(fine)?,
+        })
+    }
 }
 
 fn best(rows: &[Row]) -> Option<(&Row, f64)> {
-    let stated = rows.iter().filter_map(|row| Some((row, row.error()?)));
+    let converged = rows.iter().filter(|row| row.converged() == Some(true));
+    let stated = converged.filter_map(|row| Some((row, row.error()?)));
     stated.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -150,8 +162,13 @@ fn percent(x: f64) -> String {
     format!("{:.2} %", 100.0 * x)
 }
 
-/// Says what came of it; where the target is missed, so do the rows, here and in the results.
-fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Result<Found> {
+/// Reports the outcome. Where the target is missed, the rows get a note, here and in the results.
+fn finish(
+    scan: &mut OpenScan,
+    mut rows: Vec<Row>,
+    target: f64,
+    session: &Session,
+) -> Result<Found> {
     if session.dry_run || rows.iter().all(Row::is_disconnected) {
         return Ok(Found { rows, met: true });
     }
@@ -173,12 +190,12 @@ fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Res
     }
     if !met {
         let nearest = best(&rows);
-        let missed = Missed::of(
+        let note = ErrorTargetNote::of(
             nearest.map(|(row, _)| row).or(rows.last()),
             said(target, nearest),
         );
-        rows.iter_mut().for_each(|row| missed.note(row));
-        Results::open(dir, false)?.renote(|row| missed.note(row))?;
+        rows.iter_mut().for_each(|row| note.add_to(row));
+        scan.results().edit_rows(|row| note.add_to(row))?;
     }
     Ok(Found { rows, met })
 }

@@ -1,11 +1,12 @@
 //! Owns `info`: what is known of a scan, without segmenting it.
 
 use crate::error::Result;
-use crate::image::calibration::Calibration;
-use crate::image::calibration::GreyUnit;
+use crate::image::array::headerless::Contents;
+use crate::image::calibration::{Calibration, GreyUnit};
 use crate::image::orient::Turn;
 use crate::image::scan;
-use crate::mask::threshold;
+use crate::mask::{threshold, usable};
+use crate::pipeline::segment::implausible_voxels;
 use serde::Serialize;
 use std::path::Path;
 
@@ -44,7 +45,14 @@ pub struct ScanInfo {
 }
 
 pub fn info(file: &Path) -> Result<ScanInfo> {
-    let stored = scan::stored(file)?;
+    info_of(file, None)
+}
+
+/// The same; `raw` is what is in a file without a header.
+pub fn info_of(file: &Path, raw: Option<Contents>) -> Result<ScanInfo> {
+    let mut stored = scan::stored_as(file, raw)?;
+    let (otsu, notes) = otsu(&stored.values);
+    stored.notes.extend(notes);
     let mut sorted: Vec<f32> = stored
         .values
         .iter()
@@ -56,7 +64,6 @@ pub fn info(file: &Path) -> Result<ScanInfo> {
     sorted.sort_unstable_by(f32::total_cmp);
     let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
     let some = !sorted.is_empty();
-    let otsu = otsu(&sorted);
     let above = |t: f64| sorted.len() - sorted.partition_point(|&v| f64::from(v) < t);
     let otsu_share = otsu.map(|t| above(t) as f64 / sorted.len() as f64);
     let turn = stored.affine.as_ref().and_then(Turn::of);
@@ -89,6 +96,8 @@ pub fn info(file: &Path) -> Result<ScanInfo> {
         notes: stored.notes,
         lines: Vec::new(),
     };
+    info.notes
+        .extend(spacing.into_iter().flat_map(implausible_voxels));
     if let Some(turn) = turn {
         let words = if turn.is_identity() {
             "canonical (x right, y front, z up)".into()
@@ -108,14 +117,21 @@ pub fn info(file: &Path) -> Result<ScanInfo> {
     Ok(info)
 }
 
-/// None where there is one value only.
-fn otsu(sorted: &[f32]) -> Option<f64> {
-    let (min, max) = (*sorted.first()?, *sorted.last()?);
-    if min == max {
-        return None;
+/// Otsu's threshold and what it leaves out; None where there is one value only.
+fn otsu(values: &[f32]) -> (Option<f64>, Vec<String>) {
+    let Some(ends) = usable::extremes(values) else {
+        return (None, Vec::new());
+    };
+    let (padding, range) = usable::padding(values, &ends, None);
+    let (range, outliers) = usable::without_outliers(values, range, ends.finite);
+    let [low, high] = range;
+    if low >= high {
+        return (None, Vec::new());
     }
-    let counts = threshold::histogram(sorted, min, max);
-    threshold::otsu(&counts, f64::from(min), f64::from(max))
+    let counts = threshold::histogram(values, low, high);
+    let found = threshold::otsu(&counts, f64::from(low), f64::from(high));
+    let notes = usable::left_out(&padding, range, outliers, values.len() as u64);
+    (found, notes)
 }
 
 /// More different values than this are grey values.

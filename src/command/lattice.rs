@@ -9,10 +9,12 @@ use crate::export::{lammps, vtk};
 use crate::grid::Axis;
 use crate::io::atomic;
 use crate::machine::session::Session;
-use crate::pipeline::apparent::SolveParams;
+use crate::physics::material::Solid;
+use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::tissue::Tissue;
+use crate::pipeline::apparent::{SolveParams, of_lattice};
 use crate::pipeline::lattice::{
-    Case, LatticeParams, LatticeSummary, build, build_connected, build_of, summarise,
+    Boundary, Case, LatticeParams, LatticeSummary, build, build_connected, build_of, summarise,
     summarise_connected,
 };
 use crate::record::specimen;
@@ -47,7 +49,7 @@ struct Record {
 
 const RECORD: &str = "lattice.json";
 
-/// Builds every lattice asked for from the mask in `dir`, with the end planes along z gripped, writes `dir/lattice.json`
+/// Builds every lattice of the settings from the mask in `dir`, with the end planes along z gripped, writes `dir/lattice.json`
 /// (settings and counts) and one file per lattice and export format.
 pub fn lattice(
     dir: &Path,
@@ -89,16 +91,27 @@ pub fn lattice(
     }
     if exports.formats.contains(&Export::Lammps) {
         session.warn(
-            "LAMMPS data hold bonds alone, and a lattice of bonds alone has a Poisson's ratio of 0.25, whatever the tissue's (0.3 unless told otherwise): hold their results against `solve --poisson 0.25`",
+            "LAMMPS data hold bonds alone, and a lattice of bonds alone has a Poisson's ratio of 0.25, whatever the tissue's (0.3 by default): compare their results with `solve --poisson 0.25`",
         );
+    }
+    let tissue = Tissue::Uniform(Solid {
+        young_mpa,
+        poisson: exports.tissue.poisson,
+    });
+    let prepared = Prepared {
+        specimen: &specimen,
+        tissue: &tissue,
+    };
+    if let Some(note) = params.note() {
+        session.say(note);
     }
     let mut lattices = Vec::new();
     for case in params.cases() {
-        refuse_lattice_that_does_not_fit(&specimen, &case)?;
-        let summary = if case.is_connected() {
-            let pieces = build_connected(&specimen, &case, Axis::Z, 0.0)?;
-            written.pieces(&case, &pieces)?;
-            summarise_connected(&specimen, &case, &pieces)
+        refuse_lattice_that_does_not_fit(&of_lattice(case), prepared, &exports.tissue)?;
+        let summary = if case.boundary == Boundary::Connected {
+            let sites = build_connected(&specimen, &case, Axis::Z, 0.0)?;
+            written.components(&case, &sites)?;
+            summarise_connected(&specimen, &case, &sites)
         } else {
             let sites = build(&specimen, &case, Axis::Z, 0.0)?;
             match &factors {
@@ -164,11 +177,11 @@ impl Written<'_> {
         Ok(())
     }
 
-    fn pieces(&self, case: &Case, pieces: &ConnectedSites) -> Result<()> {
+    fn components(&self, case: &Case, sites: &ConnectedSites) -> Result<()> {
         for format in self.formats {
             match format {
-                Export::Vtk => vtk::write_connected(&self.path(case, "vtk"), pieces)?,
-                Export::Lammps => return Err(lammps::pieces()),
+                Export::Vtk => vtk::write_connected(&self.path(case, "vtk"), sites)?,
+                Export::Lammps => return Err(lammps::connected()),
             }
         }
         Ok(())

@@ -7,8 +7,9 @@ use crate::machine::host;
 use crate::machine::session::Session;
 use crate::measure::spheres::Spread;
 use crate::recipe::Recipe;
-use crate::record::collect_rows::Solved;
+use crate::record::collect_rows::CollectedRows;
 use crate::record::failures::Failure;
+use crate::record::results;
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
 use crate::report::html;
@@ -25,11 +26,11 @@ pub const RECIPE: &str = "recipe.toml";
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Scans that
 /// were solved again in their own folders after the run are read from there. Returns the files written.
 pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<PathBuf>> {
-    let mut found = Solved::default();
+    let mut found = CollectedRows::default();
     for dir in dirs {
         found.add(dir, session)?;
     }
-    let Solved { rows, failures } = found;
+    let CollectedRows { rows, failures } = found;
     session.detail(format!("{} rows from {} folders", rows.len(), dirs.len()));
     let recipe = dirs
         .iter()
@@ -91,7 +92,7 @@ fn render(report: &Report, session: &Session) -> Result<Vec<(String, Vec<u8>)>> 
     let mut files = vec![
         text("report.md", markdown::render(report)),
         text("e_app.csv", table::to_csv(&report.lines)),
-        text("results.csv", table::to_csv(&report.rows)),
+        text(results::TABLE, table::to_csv(&report.rows)),
     ];
     let statistics = &report.statistics;
     if !statistics.boxes.is_empty() {

@@ -31,8 +31,8 @@ pub struct SceneRecord {
     pub last: serde_json::Map<String, serde_json::Value>,
 }
 
-/// Runs the scene file `path` and writes its results into `out`. A scene of remodelling or fracture, or a sweep, that was stopped goes on
-/// from the last state kept there, unless forced to start anew.
+/// Runs the scene file `path` and writes its results into `out`. A scene of remodelling or fracture, or a sweep, that was stopped resumes
+/// from the last state saved there, unless forced to start from the beginning.
 pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Option<SceneRecord>)> {
     let text = std::fs::read_to_string(path).map_err(|e| {
         Error::file(
@@ -77,7 +77,12 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
     atomic::write(&out.join("scene.json"), json + "\n")?;
     writer.forget()?;
     session.say(in_words(&record));
-    if let Some(pace) = record.summary.pace.as_ref().filter(|p| p.changed()) {
+    if let Some(pace) = record
+        .summary
+        .step_statistics
+        .as_ref()
+        .filter(|p| p.changed())
+    {
         session.say(pace.to_string());
     }
     let outcome = if record.summary.converged {

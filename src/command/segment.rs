@@ -1,10 +1,10 @@
 //! Owns `segment` on disk: a scan in, `mask.nii.gz`, `segment.json` and `segment.png` out, and reading them back.
 
 use crate::draw::picture;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::image::calibration::GreyUnit;
-use crate::image::scan;
-use crate::image::scan::Scan;
+use crate::image::orient::Turn;
+use crate::image::scan::{self, Reading, Scan};
 use crate::io::atomic;
 use crate::machine::session::Session;
 use crate::measure::spheres::Spread;
@@ -14,6 +14,7 @@ use crate::record::results;
 use crate::record::specimen;
 use crate::record::specimen::{Input, SegmentRecord};
 use crate::volume::{Specimen, Volume};
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Segments `input` (a file, or a folder of slices) into `dir`. What is up to date (same input, settings and version)
@@ -25,6 +26,7 @@ pub fn segment(
     params: &SegmentParams,
     session: &Session,
 ) -> Result<SegmentRecord> {
+    refuse_own_input(input, dir)?;
     if !session.dry_run {
         atomic::sweep(dir);
     }
@@ -46,6 +48,7 @@ pub fn segment(
     let mut segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
     let warnings = &mut segmented.summary.warnings;
     warnings.extend(threshold_in_counts(&scan, params));
+    warnings.extend(values_out_of_unit(&scan, params));
     let record = SegmentRecord {
         program: env!("CARGO_PKG_NAME").into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -56,6 +59,7 @@ pub fn segment(
             voi_blake3,
             format: scan.format.clone(),
             unit: scan.unit.clone(),
+            axes: axes(&scan, params),
             notes: scan.notes.clone(),
         },
         settings: params.clone(),
@@ -67,6 +71,19 @@ pub fn segment(
         results::set_aside_stale(dir, session);
     }
     Ok(record)
+}
+
+/// Results among the slices of a scan would be taken for slices later.
+fn refuse_own_input(input: &Path, dir: &Path) -> Result<()> {
+    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    if !input.is_dir() || !same(input, dir) {
+        return Ok(());
+    }
+    Err(Error::file(
+        dir,
+        "is the folder of the scan's own slices: results would lie among them",
+        "give another folder with -o",
+    ))
 }
 
 /// Reads and segments; nothing is written.
@@ -93,21 +110,32 @@ fn read(
     params: &SegmentParams,
     session: &Session,
 ) -> Result<(Scan, Option<Volume<u8>>)> {
-    let mut scan = scan::read_in(input, params.spacing_mm, params.units)?;
+    let mut scan = scan::read_as(input, &reading(params))?;
+    stage::refuse_impossible_voxels(scan.volume.grid.spacing_mm)?;
     if let Some(name) = name {
         scan.name = name.to_owned();
     }
-    scan.notes
-        .iter()
-        .for_each(|note| session.say(format!("{}: {note}", scan.name)));
     let voi_mask = match &params.voi {
-        Voi::Mask(path) => Some(specimen::read_mask(
-            path,
-            Some(scan.volume.grid.spacing_mm),
-        )?),
+        Voi::Mask(path) => {
+            let mut notes = Vec::new();
+            let mask = stage::laid::on(&scan, path, &mut notes)?;
+            scan.notes.extend(notes);
+            Some(specimen::mask_of(&mask))
+        }
         _ => None,
     };
+    scan.notes
+        .iter()
+        .for_each(|note| session.note_of(&scan.name, note));
     Ok((scan, voi_mask))
+}
+
+fn reading(params: &SegmentParams) -> Reading {
+    Reading {
+        spacing_mm: params.spacing_mm,
+        unit: params.units,
+        raw: params.raw,
+    }
 }
 
 /// A threshold that was meant in HU and taken in a scanner's counts selects something else, and nothing looks amiss: said
@@ -138,6 +166,36 @@ fn threshold_in_counts(scan: &Scan, params: &SegmentParams) -> Option<String> {
         None => format!(
             "the threshold ({counts}) was taken in the scanner's stored counts: the file holds no calibration to HU. Give it in counts, with --units native, or a file that kept its calibration"
         ),
+    })
+}
+
+/// From the file's axes to those of the specimen. A rotated specimen has a grid of its own: it is written as it is.
+fn axes(scan: &Scan, params: &SegmentParams) -> Turn {
+    if params.align.is_some() {
+        return Turn::default();
+    }
+    let to_z = Turn {
+        from: std::array::from_fn(|a| (params.turn.index() + 1 + a) % 3),
+        ..Turn::default()
+    };
+    scan.turn.then(&to_z)
+}
+
+/// Values that cannot be in the unit that was asked for: an export that scaled them, or a header that lost its slope.
+fn values_out_of_unit(scan: &Scan, params: &SegmentParams) -> Option<String> {
+    let (name, low, high) = match (params.units?, scan.unit.as_deref()) {
+        (GreyUnit::Hu, _) | (GreyUnit::HuWhereKnown, Some("HU")) => ("HU", -5000.0, 40_000.0),
+        (GreyUnit::Mgha, _) => ("mg HA/cm³", -2000.0, 10_000.0),
+        _ => return None,
+    };
+    let values = scan.volume.as_slice().par_iter().filter(|v| v.is_finite());
+    let outside = values.filter(|v| !(low..=high).contains(*v)).count();
+    let share = outside as f64 / scan.volume.grid.len() as f64;
+    (share > 0.01).then(|| {
+        format!(
+            "{:.0} % of the values lie outside {low} to {high} {name}, where bone, water and air are: check the unit (--units) and how the scan was exported",
+            100.0 * share
+        )
     })
 }
 
@@ -235,6 +293,9 @@ fn say(record: &SegmentRecord, session: &Session) {
             m.fabric.map_or("NA".into(), |f| format!("{:.3}", f.da)),
         ));
     }
+    r.notes
+        .iter()
+        .for_each(|note| session.note_of(&record.scan, note));
     r.warnings
         .iter()
         .for_each(|w| session.warn_of(Some(&record.scan), w));

@@ -1,32 +1,47 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
 use crate::command::lattice::binned;
-use crate::command::segment::load;
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
 use crate::export::{inp, vti, vtk};
-use crate::image::nifti;
+use crate::image::{nifti, orient};
 use crate::io::atomic;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
 use crate::measure::morphometry::Morphometry;
 use crate::measure::thickness::plate_thickness_mm;
+use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::fields::Recorded;
+use crate::pipeline::apparent::job::{Job, JobResult};
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::apparent::{Load, Method, SolveParams, lattice, voxel_fe};
-use crate::pipeline::lattice::{Boundary, Case, LatticeParams};
+use crate::pipeline::apparent::{Load, SolveParams, jobs};
+use crate::pipeline::lattice::LatticeParams;
 use crate::record::results::Results;
 use crate::record::specimen;
 use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
 use crate::result::ffb::with_ffb;
 use crate::result::row::{FailureLoad, Marks, Row};
-use crate::result::settings::{BoundaryRule, CellType, Settings};
+use crate::result::settings::{BoundaryRule, Settings};
 use crate::result::shape;
-use crate::result::shape::Stated;
+use crate::result::shape::Image;
 use crate::solver::cg::CgStep;
-use crate::volume::Specimen;
+use crate::volume::{Specimen, Volume};
 use indicatif::ProgressBar;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// A segmented scan opened for solves: its mask is read, hashed and measured once for all of them.
+pub struct OpenScan {
+    dir: PathBuf,
+    specimen: Specimen,
+    tissue: Tissue,
+    results: Results,
+    /// Quick estimate, 2 BV / BS.
+    plate_thickness_mm: Option<f64>,
+    /// As `segment` measured them.
+    strut_thickness_mm: Option<f64>,
+    morphometry: Option<Morphometry>,
+    image: Image,
+}
 
 /// Solves every structure × lattice parameter × boundary for the specimen in `dir`. Rows already there for the same
 /// mask and settings are kept unless the session forces.
@@ -40,68 +55,233 @@ pub fn solve(
     params: &SolveParams,
     session: &Session,
 ) -> Result<Vec<Row>> {
-    lattices.check()?;
-    params.check()?;
-    if !session.dry_run {
-        atomic::sweep(dir);
+    let redo = session.force;
+    OpenScan::open(dir, params, redo, session)?.solve(lattices, params, session)
+}
+
+impl OpenScan {
+    /// Opens the scan in `dir` for solves of the tissue that `params` describe; `redo` leaves its results out.
+    ///
+    /// # Errors
+    /// A folder that is not a segmented scan, a material that does not fit it.
+    pub fn open(dir: &Path, params: &SolveParams, redo: bool, session: &Session) -> Result<Self> {
+        params.check()?;
+        if !session.dry_run {
+            atomic::sweep(dir);
+        }
+        let specimen = loaded(dir, params)?;
+        let measured = specimen::record(dir).map(|record| record.results);
+        Ok(OpenScan {
+            tissue: Tissue::of(&specimen, params)?,
+            results: Results::open(dir, redo)?,
+            plate_thickness_mm: plate_thickness_mm(&specimen.bone),
+            strut_thickness_mm: measured.as_ref().and_then(|m| m.mean_thickness_mm),
+            morphometry: measured.and_then(|m| m.morphometry),
+            dir: dir.to_path_buf(),
+            image: specimen::image(dir),
+            specimen,
+        })
     }
-    let specimen = loaded(dir, params)?;
-    let tissue = Tissue::of(&specimen, params)?;
-    let settings = tissue.label(params.key(&specimen), params);
-    drop(tissue);
-    if params.method == Method::Lattice {
-        warn_of_coarse(dir, lattices, session);
+
+    pub fn specimen(&self) -> &Specimen {
+        &self.specimen
     }
-    let mean_thickness_mm = plate_thickness_mm(&specimen.bone);
-    let morphometry = specimen::record(dir).and_then(|record| record.results.morphometry);
-    let mut results = Results::open(dir, session.force)?;
-    let mut rows = Vec::new();
-    for job in jobs(lattices, params) {
-        let blank = Row {
-            key: job.label(&specimen, params, settings.clone()),
+
+    pub fn prepared(&self) -> Prepared<'_> {
+        Prepared {
+            specimen: &self.specimen,
+            tissue: &self.tissue,
+        }
+    }
+
+    /// What the scan says of the surface within a voxel.
+    pub fn image(&self) -> Image {
+        self.image
+    }
+
+    /// `S` of [`shape`] for one element a voxel whose modulus answers to the surface by `sensitivity`. A block of bone without
+    /// a surface leaves nothing open.
+    pub fn surface(&self, sensitivity: Option<f64>) -> f64 {
+        let voxel_mm = self.specimen.bone.grid.voxel_mm3().cbrt();
+        self.plate_thickness_mm
+            .map_or(0.0, |t| shape::surface(sensitivity, t / voxel_mm))
+    }
+
+    pub fn bone(&self) -> &Volume<u8> {
+        &self.specimen.bone
+    }
+
+    pub fn plate_thickness_mm(&self) -> Option<f64> {
+        self.plate_thickness_mm
+    }
+
+    pub fn results(&mut self) -> &mut Results {
+        &mut self.results
+    }
+
+    /// All rows of the settings, those that follow from others among them. The tissue must be that of the opening.
+    ///
+    /// # Errors
+    /// As [`solve`].
+    pub fn solve(
+        &mut self,
+        lattices: &LatticeParams,
+        params: &SolveParams,
+        session: &Session,
+    ) -> Result<Vec<Row>> {
+        lattices.check()?;
+        params.check()?;
+        let jobs: Vec<(Job, Row)> = jobs(lattices, params)
+            .into_iter()
+            .map(|job| {
+                let row = self.blank(&job, params);
+                (job, row)
+            })
+            .collect();
+        let of_lattices = jobs.iter().any(|(_, blank)| blank.key.boundary.is_some());
+        if let Some(note) = lattices.note().filter(|_| of_lattices) {
+            session.say(note);
+        }
+        self.warn_of_coarse(jobs.iter().map(|(_, blank)| blank), session);
+        let mut rows = Vec::new();
+        for (job, blank) in &jobs {
+            let Some(mut row) = self.row(job, blank, params, session)? else {
+                continue;
+            };
+            mark(&mut row, self.morphometry.as_ref());
+            session.say(in_words(&row));
+            self.results.store(blank, params, &row)?;
+            rows.push(row);
+        }
+        let all = with_extrapolated(&with_ffb(&rows));
+        for row in all.iter().filter(|row| is_extrapolated(row)) {
+            session.say(in_words(row));
+        }
+        Ok(all)
+    }
+
+    /// A row of settings, before its solve.
+    fn blank(&self, job: &Job, params: &SolveParams) -> Row {
+        let settings = self.tissue.label(params.key(&self.specimen), params);
+        Row {
+            key: job.label(&self.specimen, params, settings),
             solved: None,
             marks: Marks {
-                mean_thickness_mm,
+                mean_thickness_mm: self.plate_thickness_mm,
                 ..Marks::default()
             },
-        };
-        let kept = results.find(&blank, params);
-        let mut row = match kept
-            .filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params))
-            // Fields are written over by the next solve: whether those there are these is not known.
-            .filter(|_| params.fields.is_empty())
-        {
-            Some(row) => row,
-            None if session.dry_run => {
-                estimate::refuse_what_does_not_fit(&specimen, job.case(), params)?;
-                let mib = estimate::of_solve_mib(&specimen, job.case(), params)?;
-                session.say(format!(
-                    "would solve {} {} mm, about {mib:.0} MiB",
-                    job.name(),
-                    blank.key.lp_mm
-                ));
-                continue;
-            }
-            None => {
-                estimate::refuse_what_does_not_fit(&specimen, job.case(), params)?;
-                solve_job(dir, &specimen, &job, &blank, params, session)?
-            }
-        };
-        mark(&mut row, morphometry.as_ref());
-        session.say(in_words(&row));
-        results.keep(&blank, params, &row)?;
-        rows.push(row);
+        }
     }
-    let all = with_extrapolated(&with_ffb(&rows));
-    for row in all.iter().filter(|row| is_extrapolated(row)) {
-        session.say(in_words(row));
+
+    /// The row that was kept, or its solve; None where the session only says what it would do.
+    fn row(
+        &self,
+        job: &Job,
+        blank: &Row,
+        params: &SolveParams,
+        session: &Session,
+    ) -> Result<Option<Row>> {
+        let prepared = Prepared {
+            specimen: &self.specimen,
+            tissue: &self.tissue,
+        };
+        // Fields are written over by the next solve: whether those there are these is not known.
+        let kept = params.fields.is_empty()
+            && (params.load != Load::Stiffness
+                || stiffness::is_current(&self.dir, params, self.results.mask_blake3()));
+        if let Some(row) = self.results.find(blank, params).filter(|_| kept) {
+            return Ok(Some(row));
+        }
+        if session.dry_run {
+            let mib = estimate::of_solve_mib(job, prepared, params)?;
+            session.say(format!(
+                "would solve {} {} mm, about {mib:.0} MiB",
+                name(&blank.key),
+                blank.key.lp_mm
+            ));
+            return Ok(None);
+        }
+        estimate::refuse_what_does_not_fit(job, prepared, params)?;
+        self.solve_job(job, blank, params, session).map(Some)
     }
-    Ok(all)
+
+    fn solve_job(
+        &self,
+        job: &Job,
+        blank: &Row,
+        params: &SolveParams,
+        session: &Session,
+    ) -> Result<Row> {
+        let prepared = Prepared {
+            specimen: &self.specimen,
+            tissue: &self.tissue,
+        };
+        let meter = Meter::start(session.shares_process);
+        let bar = session.bar(
+            1000,
+            &format!("{} {} mm", name(&blank.key), blank.key.lp_mm),
+        );
+        let loads = if params.load == Load::Stiffness { 6 } else { 1 };
+        let solution = job.solve(prepared, params, &mut |load, step| {
+            show(&bar, [load, loads], step, params.tolerance);
+        })?;
+        bar.finish_and_clear();
+        let row = match &solution {
+            JobResult::Modulus(solved, recorded) => {
+                write_fields(&self.dir, &blank.key, recorded)?;
+                let mut row = with_recorded(solved.row(blank.clone()), recorded);
+                self.state(&mut row);
+                row
+            }
+            JobResult::Stiffness(solved) => {
+                let mask_blake3 = self.results.mask_blake3();
+                let record = stiffness::record(solved, &self.specimen, params, mask_blake3);
+                stiffness::write(&self.dir, &record, session)?;
+                stiffness::row(solved, params, blank)
+            }
+        };
+        Ok(metered(row, &meter))
+    }
+
+    /// What one solve by voxel elements states of its error against the body.
+    fn state(&self, row: &mut Row) {
+        let sensitivity = row.solved.as_ref().and_then(|s| s.threshold_sensitivity);
+        let voxel_mm = self.specimen.bone.grid.voxel_mm3().cbrt();
+        let size = row.key.lp_mm / voxel_mm;
+        if let Some(elements) = row.key.elements {
+            let surface = self.surface(sensitivity);
+            let stated = shape::of_one_solve(self.image, elements, size, surface);
+            shape::state(row, stated);
+        }
+    }
+
+    /// Struts thinner than two lattice parameters are one or two sites thick, which sites of firm and floppy lattices
+    /// cannot make up for.
+    fn warn_of_coarse<'a>(&self, blanks: impl Iterator<Item = &'a Row>, session: &Session) {
+        let Some(thickness) = self.strut_thickness_mm else {
+            return;
+        };
+        let whole = |key: &&Settings| {
+            [Some(BoundaryRule::FIRM), Some(BoundaryRule::FLOPPY)].contains(&key.boundary)
+        };
+        let coarse = |key: &&Settings| key.lp_mm > 0.5 * thickness;
+        let keys = blanks.map(|row| &row.key).filter(whole).filter(coarse);
+        let mut coarse: Vec<f64> = keys.map(|key| key.lp_mm).collect();
+        coarse.sort_by(f64::total_cmp);
+        coarse.dedup();
+        let coarse: Vec<String> = coarse.iter().map(f64::to_string).collect();
+        if !coarse.is_empty() {
+            session.warn(format!(
+                "lattice parameters {} mm exceed half the mean strut thickness ({thickness:.3} mm): E_app is far from converged there",
+                coarse.join(", ")
+            ));
+        }
+    }
 }
 
 /// With grey values where the material asks for them.
-pub(super) fn loaded(dir: &Path, params: &SolveParams) -> Result<Specimen> {
-    let mut specimen = load(dir)?;
+fn loaded(dir: &Path, params: &SolveParams) -> Result<Specimen> {
+    let mut specimen = specimen::load(dir)?;
     if params.needs_grey() {
         specimen::add_grey(dir, &mut specimen)?;
     }
@@ -125,23 +305,6 @@ pub fn export_inp(dir: &Path, params: &SolveParams, bins: usize, session: &Sessi
     Ok(())
 }
 
-/// Struts thinner than two lattice parameters are one or two sites thick, which graded lattices make up for.
-fn warn_of_coarse(dir: &Path, lattice: &LatticeParams, session: &Session) {
-    if lattice.boundary.iter().all(|b| *b == Boundary::Graded) {
-        return;
-    }
-    let thickness = specimen::record(dir).and_then(|record| record.results.mean_thickness_mm);
-    let Some(thickness) = thickness else { return };
-    let coarse = lattice.lp_mm.iter().filter(|lp| **lp > 0.5 * thickness);
-    let coarse: Vec<String> = coarse.map(f64::to_string).collect();
-    if !coarse.is_empty() {
-        session.warn(format!(
-            "lattice parameters {} mm exceed half the mean strut thickness ({thickness:.3} mm): E_app is far from converged there",
-            coarse.join(", ")
-        ));
-    }
-}
-
 /// Puts the specimen's morphometry beside its modulus.
 fn mark(row: &mut Row, measured: Option<&Morphometry>) {
     let marks = &mut row.marks;
@@ -151,45 +314,16 @@ fn mark(row: &mut Row, measured: Option<&Morphometry>) {
     marks.da = measured.and_then(|m| Some(m.fabric.as_ref()?.da));
 }
 
-/// One row to solve.
-enum Job {
-    Lattice(Case),
-    VoxelFe,
-}
-
-fn jobs(lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {
-    match params.method {
-        Method::Lattice => lattices.cases().into_iter().map(Job::Lattice).collect(),
-        Method::VoxelFe => vec![Job::VoxelFe],
+/// The row with its sensitivity to the surface and the failure load, where they are known.
+fn with_recorded(mut row: Row, recorded: &Recorded) -> Row {
+    if let Some(solved) = &mut row.solved {
+        solved.threshold_sensitivity = recorded.surface.map(|s| s.sensitivity);
+        solved.failure = recorded.failure.map(|f| FailureLoad {
+            load_n: f.load_n,
+            factor: f.factor,
+        });
     }
-}
-
-impl Job {
-    /// The columns that tell what was solved.
-    fn label(&self, specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings {
-        match self {
-            Job::Lattice(case) => lattice::label(key, case),
-            Job::VoxelFe => voxel_fe::label(key, specimen, params),
-        }
-    }
-
-    fn case(&self) -> Option<&Case> {
-        match self {
-            Job::Lattice(case) => Some(case),
-            Job::VoxelFe => None,
-        }
-    }
-
-    fn is_stiffness(&self, params: &SolveParams) -> bool {
-        matches!(self, Job::VoxelFe) && params.load == Load::Stiffness
-    }
-
-    fn name(&self) -> String {
-        match self {
-            Job::Lattice(case) => format!("{} {}", case.structure.name(), case.boundary.name()),
-            Job::VoxelFe => CellType::Hex8.name().to_owned(),
-        }
-    }
+    row
 }
 
 /// The row with what its solve took.
@@ -201,97 +335,47 @@ fn metered(mut row: Row, meter: &Meter) -> Row {
     row
 }
 
-fn solve_job(
-    dir: &Path,
-    specimen: &Specimen,
-    job: &Job,
-    blank: &Row,
-    params: &SolveParams,
-    session: &Session,
-) -> Result<Row> {
-    let meter = Meter::start();
-    let bar = session.bar(1000, &format!("{} {} mm", job.name(), blank.key.lp_mm));
-    if job.is_stiffness(params) {
-        let observe = |load: usize, step| show_load(&bar, load, step, params.tolerance);
-        let row = stiffness::solve(dir, specimen, params, blank, session, observe)?;
-        bar.finish_and_clear();
-        return Ok(metered(row, &meter));
+/// What a row is solved with, in short.
+fn name(key: &Settings) -> String {
+    match key.boundary {
+        Some(boundary) => format!("{} {}", key.structure.name(), boundary.name()),
+        None => key.structure.name().to_owned(),
     }
-    let observe = |step| show(&bar, step, params.tolerance);
-    let (solved, recorded) = match job {
-        Job::Lattice(case) => {
-            let (solved, fields) = lattice::solve_recorded(specimen, case, params, observe)?;
-            if let Some(fields) = fields {
-                let name = case.stem();
-                vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), &name, &fields)?;
-            }
-            (solved, Recorded::default())
-        }
-        Job::VoxelFe => voxel_fe::solve_recorded(specimen, params, observe)?,
-    };
-    bar.finish_and_clear();
-    write_fields(dir, &recorded)?;
-    let mut row = solved.row(blank.clone());
-    if let Some(solved) = &mut row.solved {
-        solved.threshold_sensitivity = recorded.surface.map(|s| s.sensitivity);
-        solved.failure = recorded.failure.map(|f| FailureLoad {
-            load_n: f.load_n,
-            factor: f.factor,
-        });
-    }
-    if params.method == Method::VoxelFe {
-        let stated = stated(dir, specimen, &row);
-        shape::state(&mut row, stated);
-    }
-    Ok(metered(row, &meter))
 }
 
-/// What one solve by voxel elements states of its error against the body.
-fn stated(dir: &Path, specimen: &Specimen, row: &Row) -> Option<Stated> {
-    let voxel_mm = specimen.bone.grid.voxel_mm3().cbrt();
-    let sensitivity = row.solved.as_ref()?.threshold_sensitivity;
-    // A block of bone without a surface: nothing is open.
-    let surface = match plate_thickness_mm(&specimen.bone) {
-        Some(thickness_mm) => shape::surface(sensitivity, thickness_mm / voxel_mm),
-        None => 0.0,
-    };
-    shape::of_one_solve(
-        specimen::image(dir),
-        row.key.elements?,
-        row.key.lp_mm / voxel_mm,
-        surface,
-    )
-}
-
-/// `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView.
-fn write_fields(dir: &Path, recorded: &Recorded) -> Result<()> {
-    for field in &recorded.fields {
-        let file = format!("field-{}.nii.gz", field.name.replace('_', "-"));
-        nifti::write(&dir.join(file), &field.values)?;
+/// `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView; of a lattice
+/// `fields-STRUCTURE-BOUNDARY-LP.vtk`.
+fn write_fields(dir: &Path, key: &Settings, recorded: &Recorded) -> Result<()> {
+    if let Some(fields) = &recorded.sites {
+        let name = format!("{}-{}", name(key).replace(' ', "-"), key.lp_mm);
+        vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), &name, fields)?;
     }
-    let arrays: Vec<_> = recorded
+    let back = specimen::axes(dir).inverse();
+    let stored: Vec<(&str, Volume<f32>)> = recorded
         .fields
         .iter()
-        .map(|f| (f.name, &f.values))
+        .map(|field| (field.name, orient::turned(field.values.clone(), &back)))
+        .collect();
+    for (name, values) in &stored {
+        let file = format!("field-{}.nii.gz", name.replace('_', "-"));
+        nifti::write(&dir.join(file), values)?;
+    }
+    let arrays: Vec<_> = stored
+        .iter()
+        .map(|(name, values)| (*name, values))
         .collect();
     vti::write(&dir.join("fields.vti"), &arrays)
 }
 
-/// Progress is the share of the error's decades already gained.
-fn show(bar: &ProgressBar, step: CgStep, tolerance: f64) {
+/// Progress is the share of the error's decades already gained, over all loads.
+fn show(bar: &ProgressBar, [load, loads]: [usize; 2], step: CgStep, tolerance: f64) {
     if let Some(error) = step.energy_error.filter(|e| *e > 0.0) {
         let gained = (error.log10() / tolerance.log10()).clamp(0.0, 1.0);
-        bar.set_position((1000.0 * gained) as u64);
-        bar.set_message(format!("iteration {}, error {:.1e}", step.iteration, error));
-    }
-}
-
-/// The same over six loads.
-fn show_load(bar: &ProgressBar, load: usize, step: CgStep, tolerance: f64) {
-    if let Some(error) = step.energy_error.filter(|e| *e > 0.0) {
-        let gained = (error.log10() / tolerance.log10()).clamp(0.0, 1.0);
-        bar.set_position((1000.0 * (load as f64 + gained) / 6.0) as u64);
-        bar.set_message(format!("strain {} of 6, error {error:.1e}", load + 1));
+        bar.set_position((1000.0 * (load as f64 + gained) / loads as f64) as u64);
+        bar.set_message(match loads {
+            1 => format!("iteration {}, error {error:.1e}", step.iteration),
+            _ => format!("strain {} of {loads}, error {error:.1e}", load + 1),
+        });
     }
 }
 

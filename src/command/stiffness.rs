@@ -4,42 +4,36 @@ use crate::error::Result;
 use crate::machine::session::Session;
 use crate::measure::stiffness::{orthotropic, young_along};
 use crate::pipeline::apparent::SolveParams;
-use crate::pipeline::apparent::stiffness::{Stiffness, solve_stiffness};
-use crate::record::specimen::MASK;
+use crate::pipeline::apparent::stiffness::Stiffness;
 use crate::record::stiffness as file;
 use crate::record::stiffness::StiffnessRecord;
 use crate::result::row::{Marks, Row, Solution};
-use crate::solver::cg::CgStep;
 use crate::volume::Specimen;
 use std::path::Path;
 
 pub const RECORD: &str = "stiffness.json";
 
-/// Whether the matrix in `dir` follows from these settings and this mask.
-pub fn is_there(dir: &Path, params: &SolveParams) -> bool {
+/// Whether the matrix in `dir` follows from these settings and the mask of this hash.
+pub fn is_current(dir: &Path, params: &SolveParams, mask_blake3: &str) -> bool {
     file::record(&dir.join(RECORD)).is_some_and(|record| {
         record.settings == *params
             && record.version == env!("CARGO_PKG_VERSION")
-            && mask_blake3(dir).is_ok_and(|hash| hash == record.mask_blake3)
+            && record.mask_blake3 == mask_blake3
     })
 }
 
-/// Solves the six unit strains, writes `stiffness.json` and completes the row: E_app is Young's modulus along the load
-/// axis that follows from the matrix.
-pub fn solve(
-    dir: &Path,
+/// The content of `stiffness.json`.
+pub fn record(
+    solved: &Stiffness,
     specimen: &Specimen,
     params: &SolveParams,
-    blank: &Row,
-    session: &Session,
-    observe: impl FnMut(usize, CgStep),
-) -> Result<Row> {
-    let solved = solve_stiffness(specimen, params, observe)?;
-    let record = StiffnessRecord {
+    mask_blake3: &str,
+) -> StiffnessRecord {
+    StiffnessRecord {
         program: env!("CARGO_PKG_NAME").to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scan: specimen.name.clone(),
-        mask_blake3: mask_blake3(dir)?,
+        mask_blake3: mask_blake3.to_owned(),
         settings: params.clone(),
         boundary_conditions: params.conditions.in_words().to_owned(),
         voigt_order: StiffnessRecord::voigt_order(),
@@ -56,13 +50,21 @@ pub fn solve(
         algebraic_error_mpa: solved.error_mpa,
         asymmetry_mpa: solved.asymmetry_mpa,
         orthotropic: orthotropic(&solved.matrix_mpa),
-    };
-    file::write(&dir.join(RECORD), &record)?;
-    say(&record, session);
-    Ok(row(&solved, params, blank))
+    }
 }
 
-fn row(solved: &Stiffness, params: &SolveParams, blank: &Row) -> Row {
+/// Writes `stiffness.json`, and says what is in it.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(dir: &Path, record: &StiffnessRecord, session: &Session) -> Result<()> {
+    file::write(&dir.join(RECORD), record)?;
+    say(record, session);
+    Ok(())
+}
+
+/// Completes a row: E_app is Young's modulus along the load axis that follows from the matrix.
+pub fn row(solved: &Stiffness, params: &SolveParams, blank: &Row) -> Row {
     let (e_app, error) = young_along(&solved.matrix_mpa, &solved.error_mpa, params.axis);
     let mut note = format!(
         "E along {} of the matrix in {RECORD}; {}",
@@ -115,8 +117,4 @@ fn say(record: &StiffnessRecord, session: &Session) {
             100.0 * o.residual
         ));
     }
-}
-
-fn mask_blake3(dir: &Path) -> Result<String> {
-    crate::image::scan::hash(&dir.join(MASK))
 }

@@ -6,8 +6,9 @@ use crate::error::{Error, Result};
 use crate::export::bins::Bins;
 use crate::io::atomic;
 use crate::operator::held::Held;
-use crate::pipeline::apparent::bricks::{Bricks, Keep};
+use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::tissue::Tissue;
+use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use crate::pipeline::apparent::voxel_fe::supports;
 use crate::pipeline::apparent::{Ends, Load, Method, SolveParams};
 use crate::volume::Specimen;
@@ -43,7 +44,9 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
             "use --load uniaxial or confined",
         );
     }
-    let model = Bricks::new(specimen, params, Keep::BetweenGrips)?;
+    let tissue = &Tissue::of(specimen, params)?;
+    let prepared = Prepared { specimen, tissue };
+    let model = Bricks::new(prepared, params, Keep::BetweenGrips)?;
     let mesh = model.mesh();
     if mesh.is_empty() {
         return Err(Error::specimen(
@@ -52,9 +55,9 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
         ));
     }
     let grips = Planes::within(&mesh.grid, params.axis, params.grip_mm)?;
-    let (young_mpa, poissons) = match Tissue::of(specimen, params)? {
+    let (young_mpa, poissons) = match tissue {
         Tissue::Uniform(solid) => (solid.young_mpa, vec![solid.poisson]),
-        Tissue::Mixed(mixed) => (mixed.mean_mpa, mixed.poissons),
+        Tissue::Mixed(mixed) => (mixed.mean_mpa, mixed.poissons.clone()),
     };
     let stiffness: Vec<(f64, u8)> = corners(mesh)
         .map(|node| {
@@ -70,7 +73,7 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
 /// The node of smallest x, y, z of each element, in the order of the elements.
 fn corners(mesh: &VoxelMesh) -> impl Iterator<Item = usize> {
     let nodes = mesh.segments.iter().flat_map(|segment| segment.nodes());
-    nodes.filter(|&node| mesh.around[node] & 0x80 != 0)
+    nodes.filter(|&node| mesh.has_element(node))
 }
 
 /// Materials by number, and that of each element.
@@ -111,7 +114,8 @@ fn fill(
 ) -> std::io::Result<()> {
     let axis = params.axis.index();
     let gauge_mm = (grips.high - grips.low) as f64 * mesh.grid.spacing_mm[axis];
-    let (held, u) = supports(mesh, grips, params, params.strain * gauge_mm);
+    let held = supports::held(mesh, grips, params);
+    let u = supports::bar(mesh, grips, params.strain * gauge_mm);
     writeln!(
         out,
         "** {} elements; mm, N, MPa; E_app = force of HIGH x {gauge_mm} mm / (area x {} mm)",
@@ -124,10 +128,13 @@ fn fill(
         let [x, y, z] = mesh.position(node);
         writeln!(out, "{}, {x:.10}, {y:.10}, {z:.10}", node + 1)?;
     }
+    let elements = by_material(mesh, materials);
     for (material, (young_mpa, poisson)) in materials.table.iter().enumerate() {
         let name = 1 + material;
         writeln!(out, "*ELEMENT, TYPE=C3D8, ELSET=BONE{name}")?;
-        elements(out, mesh, |element| materials.of[element] == material)?;
+        for element in &elements[material] {
+            brick(out, mesh, element)?;
+        }
         writeln!(
             out,
             "*MATERIAL, NAME=TISSUE{name}\n*ELASTIC\n{young_mpa}, {poisson}\n*SOLID SECTION, ELSET=BONE{name}, MATERIAL=TISSUE{name}"
@@ -147,31 +154,39 @@ fn fill(
     writeln!(out, "*NODE PRINT, NSET=HIGH, TOTALS=ONLY\nRF\n*END STEP")
 }
 
-fn elements(
-    out: &mut impl Write,
-    mesh: &VoxelMesh,
-    wanted: impl Fn(usize) -> bool,
-) -> std::io::Result<()> {
+/// An element's number in the file, and the node of smallest x, y, z: its segment and place there.
+struct Element {
+    number: usize,
+    segment: u32,
+    place: u32,
+}
+
+/// The elements of each material, in their order.
+fn by_material(mesh: &VoxelMesh, materials: &Materials) -> Vec<Vec<Element>> {
+    let mut found: Vec<Vec<Element>> = materials.table.iter().map(|_| Vec::new()).collect();
     let mut number = 0;
-    for segment in &mesh.segments {
-        for i in 0..segment.len {
-            if mesh.around[(segment.start + i) as usize] & 0x80 == 0 {
-                continue;
-            }
+    for (s, segment) in mesh.segments.iter().enumerate() {
+        for place in (0..segment.len).filter(|i| mesh.has_element((segment.start + i) as usize)) {
+            found[materials.of[number]].push(Element {
+                number: number + 1,
+                segment: s as u32,
+                place,
+            });
             number += 1;
-            if !wanted(number - 1) {
-                continue;
-            }
-            write!(out, "{number}")?;
-            for [x, y, z] in CORNERS {
-                // Row (dy, dz) of neighbours, at this node's own x.
-                let row = segment.rows[(1 + y + 3 * (1 + z)) as usize];
-                write!(out, ", {}", row + i + x + 1)?;
-            }
-            writeln!(out)?;
         }
     }
-    Ok(())
+    found
+}
+
+fn brick(out: &mut impl Write, mesh: &VoxelMesh, element: &Element) -> std::io::Result<()> {
+    write!(out, "{}", element.number)?;
+    let rows = &mesh.segments[element.segment as usize].rows;
+    for [x, y, z] in CORNERS {
+        // Row (dy, dz) of neighbours, at this node's own x.
+        let row = rows[(1 + y + 3 * (1 + z)) as usize];
+        write!(out, ", {}", row + element.place + x + 1)?;
+    }
+    writeln!(out)
 }
 
 fn boundary(

@@ -42,11 +42,11 @@ pub fn write(path: &Path, sites: &Sites, tissue: Tissue) -> Result<f64> {
     Ok(bins.worst)
 }
 
-/// Why a lattice of pieces is not written.
-pub fn pieces() -> Error {
+/// Why a connected lattice is not written.
+pub fn connected() -> Error {
     Error::setting(
         "--export lammps",
-        "a graded SC lattice joins pieces of bone at one point by springs of no length",
+        "a connected (graded SC) lattice joins components of bone at one point by springs of no length",
         "export firm or floppy lattices, or BCC",
     )
 }

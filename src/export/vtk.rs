@@ -26,17 +26,11 @@ pub fn write_lattice(path: &Path, sites: &Sites) -> Result<()> {
     write(path, &sites.frame, &sites.indices, &bonds, &weights)
 }
 
-/// [`write_lattice`] for the pieces of a graded lattice: the weight is a piece's bone fraction. ConnectedSites of one cell lie
-/// at one point.
-pub fn write_connected(path: &Path, pieces: &ConnectedSites) -> Result<()> {
-    let bonds: Vec<[u32; 2]> = pieces.pairs().map(|(a, b)| [a, b]).collect();
-    write(
-        path,
-        &pieces.frame,
-        &pieces.indices,
-        &bonds,
-        &pieces.fractions,
-    )
+/// [`write_lattice`] for a connected lattice: the weight is a component's bone fraction. Components of one cell lie at one
+/// point.
+pub fn write_connected(path: &Path, sites: &ConnectedSites) -> Result<()> {
+    let bonds: Vec<[u32; 2]> = sites.pairs().map(|(a, b)| [a, b]).collect();
+    write(path, &sites.frame, &sites.indices, &bonds, &sites.fractions)
 }
 
 /// Fields of a solved lattice, as points with values: mm and MPa.

@@ -81,6 +81,26 @@ impl Calibration {
     }
 }
 
+/// The name that this program uses: `HU`, `mg HA/cm3`, or the file's own word. None where the word says that there is none.
+pub fn unit_named(text: &str) -> Option<String> {
+    let text = text.trim().trim_matches(['"', '\'']).trim();
+    let short: String = text
+        .to_lowercase()
+        .replace('³', "3")
+        .chars()
+        .filter(|c| c.is_alphanumeric() || *c == '/')
+        .collect();
+    Some(match short.as_str() {
+        "hu" | "hounsfield" | "hounsfieldunit" | "hounsfieldunits" => "HU".into(),
+        "mgha/ccm" | "mgha/cm3" | "mgha/cm" | "mgha/cc" | "mg/ccmha" | "mg/cm3ha" | "mghaccm" => {
+            "mg HA/cm3".into()
+        }
+        // US is DICOM's word for unspecified.
+        "" | "us" | "unspecified" | "unknown" | "none" | "arbitrary" => return None,
+        _ => text.to_string(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -105,5 +125,17 @@ mod tests {
             .line(GreyUnit::Hu, Path::new("x.aim"))
             .unwrap_err();
         assert!(e.to_string().contains("x.aim"));
+    }
+
+    #[test]
+    fn spellings_of_one_unit_are_one() {
+        for word in ["HU", "hu ", "\"Hounsfield Units\""] {
+            assert_eq!(unit_named(word).as_deref(), Some("HU"), "{word}");
+        }
+        for word in ["mgHA/ccm", "mg HA/ccm", "mg HA/cm^3", "mg HA/cm³"] {
+            assert_eq!(unit_named(word).as_deref(), Some("mg HA/cm3"), "{word}");
+        }
+        assert_eq!(unit_named("US"), None);
+        assert_eq!(unit_named("1/cm").as_deref(), Some("1/cm"));
     }
 }

@@ -1,8 +1,7 @@
 //! Owns what can be told of a scan without reading its voxels: its extent, and whether a TIFF file is a whole stack.
 
-use crate::image::slices;
 use crate::image::tiff::directories;
-use nifti::NiftiHeader;
+use crate::image::{nifti, slices};
 use std::fs::File;
 use std::io::{BufReader, Seek};
 use std::path::Path;
@@ -29,13 +28,13 @@ pub fn of(path: &Path) -> Option<Extent> {
         });
     }
     let name = path.file_name()?.to_string_lossy().to_lowercase();
-    if name.ends_with(".nii") || name.ends_with(".nii.gz") {
-        let header = NiftiHeader::from_file(path).ok()?;
-        return Some(Extent {
-            voxels: [1, 2, 3].map(|a| usize::from(header.dim[a]).max(1)),
-            spacing_mm: Some([1, 2, 3].map(|a| f64::from(header.pixdim[a])))
-                .filter(|h| h.iter().all(|v| *v > 0.0)),
-        });
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    if [".nii", ".hdr", ".img"]
+        .iter()
+        .any(|end| name.ends_with(end))
+    {
+        let (voxels, spacing_mm) = nifti::extent(path)?;
+        return Some(Extent { voxels, spacing_mm });
     }
     pages(path).map(|voxels| Extent {
         voxels,
@@ -51,7 +50,8 @@ pub fn is_stack(path: &Path) -> bool {
 /// Width, height, and pages of a TIFF file; an ImageJ stack of one directory tells its pages in its description.
 fn pages(path: &Path) -> Option<[usize; 3]> {
     let mut file = File::open(path).ok()?;
-    if directories::fault(&file).is_some() {
+    let bytes = file.metadata().ok()?.len();
+    if directories::fault(&mut file, bytes).is_some() {
         return None;
     }
     file.rewind().ok()?;

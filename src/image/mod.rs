@@ -1,12 +1,13 @@
 //! Scan readers, one format a file. [`scan`] is the one way in. They know volumes, grids and errors only.
 
+pub mod array;
 pub mod calibration;
+pub mod description;
 pub mod dicom;
 pub mod extent;
-pub mod imagej;
+pub mod length;
 pub mod metaimage;
 pub mod nifti;
-pub mod npy;
 pub mod nrrd;
 pub mod orient;
 pub mod raw;

@@ -2,11 +2,13 @@
 
 use crate::error::{Error, Result};
 use crate::grid::Grid;
+use crate::image::array::headerless::{self, Contents};
+use crate::image::array::npy;
 use crate::image::calibration::{Calibration, GreyUnit};
-use crate::image::orient;
+use crate::image::orient::{self, Affine, Turn};
 use crate::image::scanco::{aim, isq};
 use crate::image::stored::Stored;
-use crate::image::{dicom, metaimage, nifti, npy, nrrd, slices, tiff};
+use crate::image::{dicom, metaimage, nifti, nrrd, slices, tiff};
 use crate::volume::Volume;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -23,24 +25,46 @@ pub struct Scan {
     pub calibration: Option<Calibration>,
     /// Axes x, y, z canonical where the file has an orientation, else as stored. May hold NaN and infinities.
     pub volume: Volume<f32>,
+    /// From the axes as stored to those of `volume`.
+    pub turn: Turn,
+    /// Values from the first to the second stand for no measurement.
+    pub padding: Option<[f32; 2]>,
+    /// What the file says of voxel size and place, along the axes of `volume`, whatever voxel size was asked for.
+    pub file_spacing_mm: Option<[f64; 3]>,
+    pub file_affine: Option<Affine>,
     pub details: Vec<(String, String)>,
     /// What a user should know of how the file was understood.
     pub notes: Vec<String>,
 }
 
-/// Reads a scan in its own units. `spacing_mm` (x, y, z of the canonical axes) overrides the file's voxel size.
-pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
-    read_in(path, spacing_mm, None)
+/// How a scan is to be read.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reading {
+    /// Voxel size along x, y, z of the canonical axes; wins over the file's.
+    pub spacing_mm: Option<[f64; 3]>,
+    /// Of a Scanco scan's grey values; None: as stored.
+    pub unit: Option<GreyUnit>,
+    /// What is in a file without a header.
+    pub raw: Option<Contents>,
 }
 
-/// The same with a Scanco scan's grey values in `unit`; None: as stored.
-pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>) -> Result<Scan> {
-    let mut stored = stored(path)?;
-    calibrate(&mut stored, unit.unwrap_or(GreyUnit::Native), path)?;
+/// Reads a scan in its own units. `spacing_mm` (x, y, z of the canonical axes) overrides the file's voxel size.
+pub fn read(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Scan> {
+    read_as(
+        path,
+        &Reading {
+            spacing_mm,
+            ..Reading::default()
+        },
+    )
+}
+
+pub fn read_as(path: &Path, reading: &Reading) -> Result<Scan> {
+    let spacing_mm = reading.spacing_mm.map(checked_spacing).transpose()?;
+    let mut stored = stored_as(path, reading.raw)?;
+    calibrate(&mut stored, reading.unit.unwrap_or(GreyUnit::Native), path)?;
     let mut notes = stored.notes;
-    let found = stored
-        .spacing_mm
-        .filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));
+    let found = stored.spacing_mm;
     let Some(spacing) = found.or(spacing_mm) else {
         return Err(Error::file(
             path,
@@ -51,18 +75,27 @@ pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>
             "give it with --spacing MM (for example --spacing 0.0195)",
         ));
     };
-    let grid = Grid::new(stored.n, spacing);
-    let mut volume = match stored.affine {
-        Some(affine) => orient::canonical(grid, stored.values, affine, &mut notes),
-        None => Volume::from_vec(grid, stored.values),
+    let (mut volume, turn) = match (stored.affine, found) {
+        (Some(affine), Some(spacing)) => {
+            let grid = Grid::new(stored.n, spacing);
+            orient::canonical(grid, stored.values, affine, &mut notes)
+        }
+        (Some(directions), None) => {
+            let back = Turn::of(&directions).unwrap_or_default().inverse();
+            let along = back.from.map(|r| spacing[r]);
+            let grid = Grid::new(stored.n, along);
+            let affine = orient::scaled(&directions, along);
+            orient::canonical(grid, stored.values, affine, &mut notes)
+        }
+        (None, _) => {
+            let grid = Grid::new(stored.n, spacing);
+            (Volume::from_vec(grid, stored.values), Turn::default())
+        }
     };
+    let file_affine = volume.affine;
+    let file_spacing_mm = found.map(|_| volume.grid.spacing_mm);
     if let Some(wanted) = spacing_mm {
-        respace(
-            &mut volume,
-            checked_spacing(wanted)?,
-            found.is_some(),
-            &mut notes,
-        );
+        respace(&mut volume, wanted, found.is_some(), &mut notes);
     }
     Ok(Scan {
         name: name(path),
@@ -71,18 +104,23 @@ pub fn read_in(path: &Path, spacing_mm: Option<[f64; 3]>, unit: Option<GreyUnit>
         unit: stored.unit,
         calibration: stored.calibration,
         volume,
+        turn,
+        padding: stored.padding,
+        file_spacing_mm,
+        file_affine,
         details: stored.details,
         notes,
     })
 }
 
-/// Values with their axes as stored, whatever the orientation says: masks and grey values of a segmented scan, which may
-/// have been turned. `spacing_mm` is the voxel size.
-pub fn read_as_stored(path: &Path, spacing_mm: [f64; 3]) -> Result<Volume<f32>> {
+/// Values of a file that this program wrote on the grid of a scan, brought to the axes that `turn` made of the stored
+/// ones. `spacing_mm` is the voxel size along the turned axes.
+pub fn read_turned(path: &Path, turn: &Turn, spacing_mm: [f64; 3]) -> Result<Volume<f32>> {
     let stored = stored(path)?;
-    let mut volume = Volume::from_vec(Grid::new(stored.n, spacing_mm), stored.values);
+    let grid = Grid::new(stored.n, turn.inverse().from.map(|r| spacing_mm[r]));
+    let mut volume = Volume::from_vec(grid, stored.values);
     volume.affine = stored.affine;
-    Ok(volume)
+    Ok(orient::turned(volume, turn))
 }
 
 /// Files of other formats hold the unit they were saved in: nothing to convert, but a contradiction is an error.
@@ -120,7 +158,41 @@ fn calibrate(stored: &mut Stored, unit: GreyUnit, path: &Path) -> Result<()> {
 }
 
 /// What a file or folder holds, axes as stored.
+///
+/// What changes the meaning of voxels (orientation, shear, units, scale, channels, time, padding, bit order, byte order,
+/// skips, order of frames) is honoured, or refused in words; it is never dropped. Each reader's documentation lists the keys
+/// of its format and says of each whether it is read, refused or harmless.
+///
+/// # Errors
+/// No file, no scan, a damaged one, or one whose voxels are no boxes on one grid.
 pub fn stored(path: &Path) -> Result<Stored> {
+    stored_as(path, None)
+}
+
+/// The same; `raw` is what is in a file without a header.
+pub fn stored_as(path: &Path, raw: Option<Contents>) -> Result<Stored> {
+    let mut stored = by_format(path, raw)?;
+    stored.spacing_mm = stored
+        .spacing_mm
+        .filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));
+    if let Some(affine) = &stored.affine {
+        orient::check(path, affine, &mut stored.notes)?;
+    }
+    if stored.format.contains("int32") || stored.format.contains("int64") {
+        let rounded = |v: &f32| v.abs() >= MOST_INTEGER;
+        if stored.values.par_iter().any(rounded) {
+            stored.notes.push(format!(
+                "integers from {MOST_INTEGER} on are rounded: values are kept in single precision"
+            ));
+        }
+    }
+    Ok(stored)
+}
+
+/// From here on single precision does not hold every integer.
+const MOST_INTEGER: f32 = 16_777_216.0;
+
+fn by_format(path: &Path, raw: Option<Contents>) -> Result<Stored> {
     let meta = std::fs::metadata(path).map_err(|e| {
         Error::file(
             path,
@@ -137,13 +209,18 @@ pub fn stored(path: &Path) -> Result<Stored> {
         Some(Kind::MetaImage) => metaimage::read(path),
         Some(Kind::Nrrd) => nrrd::read(path),
         Some(Kind::Npy) => npy::read(path),
+        Some(Kind::Npz) => npy::read_archive(path),
+        Some(Kind::Headerless) => match raw {
+            Some(contents) => headerless::read(path, contents),
+            None => Err(headerless::unknown(path)),
+        },
         Some(Kind::Aim) => aim::read(path),
         Some(Kind::Isq) => isq::read(path),
         Some(Kind::Dicom) => dicom::read(path, &[path.to_path_buf()]),
         None => Err(Error::file(
             path,
             "is not a scan format that is read",
-            "give NIfTI, TIFF, MetaImage, NRRD, AIM, ISQ, DICOM or NumPy, or a folder of slices (TIFF, PNG, BMP, DICOM)",
+            "give NIfTI, Analyze, TIFF, MetaImage, NRRD, AIM, ISQ, DICOM or NumPy, or a folder of slices (TIFF, PNG, BMP, DICOM)",
         )),
     }
 }
@@ -156,18 +233,22 @@ enum Kind {
     MetaImage,
     Nrrd,
     Npy,
+    Npz,
+    Headerless,
     Aim,
     Isq,
     Dicom,
 }
 
-/// By its name; `;1` is a version that VMS appends.
+/// By its name, DICOM also by its first bytes; `;1` is a version that VMS appends.
 fn kind(path: &Path) -> Option<Kind> {
-    const ENDS: [(&str, Kind); 15] = [
+    const ENDS: [(&str, Kind); 21] = [
         (".nii", Kind::Nifti),
         (".nii.gz", Kind::Nifti),
         (".hdr", Kind::Nifti),
         (".hdr.gz", Kind::Nifti),
+        (".img", Kind::Nifti),
+        (".img.gz", Kind::Nifti),
         (".tif", Kind::Tiff),
         (".tiff", Kind::Tiff),
         (".mha", Kind::MetaImage),
@@ -175,15 +256,20 @@ fn kind(path: &Path) -> Option<Kind> {
         (".nrrd", Kind::Nrrd),
         (".nhdr", Kind::Nrrd),
         (".npy", Kind::Npy),
+        (".npz", Kind::Npz),
+        (".raw", Kind::Headerless),
+        (".vol", Kind::Headerless),
         (".aim", Kind::Aim),
         (".isq", Kind::Isq),
         (".dcm", Kind::Dicom),
+        (".dicom", Kind::Dicom),
         (".ima", Kind::Dicom),
     ];
     let name = path.file_name()?.to_string_lossy().to_lowercase();
     let name = without_vms_version(&name);
     ENDS.iter()
         .find_map(|(end, kind)| name.ends_with(end).then_some(*kind))
+        .or_else(|| dicom::is_dicom(path).then_some(Kind::Dicom))
 }
 
 /// `scan.aim;1` without its `;1`.
@@ -198,9 +284,12 @@ fn without_vms_version(name: &str) -> &str {
     }
 }
 
-/// True for what [`read`] takes as one file (by its name; the content may still be refused).
+/// True for what [`read`] takes as one file (by its name; the content may still be refused). Of a pair it is the header. Voxels
+/// without a header are none: most lie beside the header of another format.
 pub fn is_scan_file(path: &Path) -> bool {
-    path.is_file() && kind(path).is_some()
+    path.is_file()
+        && kind(path).is_some_and(|kind| kind != Kind::Headerless)
+        && !nifti::is_image_half(path)
 }
 
 fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {
@@ -214,11 +303,17 @@ fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {
     ))
 }
 
+/// How a note begins that says that the file's voxel size was overruled.
+pub const REPLACED: &str = "voxel size replaced";
+
 fn respace(volume: &mut Volume<f32>, wanted: [f64; 3], known: bool, notes: &mut Vec<String>) {
     let old = volume.grid.spacing_mm;
     if known && (0..3).any(|a| (old[a] / wanted[a] - 1.0).abs() > 1e-3) {
+        let words = |s: [f64; 3]| s.map(|v| v.to_string()).join(" × ");
         notes.push(format!(
-            "voxel size {old:?} mm of the file replaced by {wanted:?} mm as asked"
+            "{REPLACED}: the file says {} mm, {} mm are taken as asked (--spacing)",
+            words(old),
+            words(wanted)
         ));
     }
     if let Some(affine) = &mut volume.affine {
@@ -262,23 +357,25 @@ pub fn hash(path: &Path) -> Result<String> {
             hasher.update(hash_file(&file)?.as_bytes());
         }
     } else {
-        let Some(data) = data_file(path).filter(|data| data.is_file()) else {
+        let data = data_files(path);
+        if data.is_empty() {
             return Ok(hash_file(path)?.to_hex().to_string());
-        };
+        }
         hasher.update(hash_file(path)?.as_bytes());
-        hasher.update(hash_file(&data)?.as_bytes());
+        for file in data.iter().filter(|file| file.is_file()) {
+            hasher.update(hash_file(file)?.as_bytes());
+        }
     }
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// The file of voxels that a header beside it names.
-fn data_file(path: &Path) -> Option<PathBuf> {
-    let name = path.file_name()?.to_string_lossy().to_lowercase();
-    match kind(path)? {
-        Kind::MetaImage if name.ends_with(".mhd") => metaimage::data_file(path),
-        Kind::Nrrd if name.ends_with(".nhdr") => nrrd::data_file(path),
-        Kind::Nifti if name.contains(".hdr") => Some(nifti::image_of(path)),
-        _ => None,
+/// The files of voxels that a header beside them names.
+fn data_files(path: &Path) -> Vec<PathBuf> {
+    match kind(path) {
+        Some(Kind::MetaImage) => metaimage::data_files(path),
+        Some(Kind::Nrrd) => nrrd::data_files(path),
+        Some(Kind::Nifti) => nifti::data_file(path).into_iter().collect(),
+        _ => Vec::new(),
     }
 }
 

@@ -104,7 +104,7 @@ fn readable_by_all(file: &std::fs::File) -> std::io::Result<()> {
     file.set_permissions(std::fs::Permissions::from_mode(0o666 & !umask))
 }
 
-/// The process's umask. Linux tells it in /proc; elsewhere it can only be read by setting it, so the usual 022 is assumed.
+/// The process's umask. Linux reports it in /proc; elsewhere it can only be read by setting it, so the usual 022 is assumed.
 #[cfg(unix)]
 fn read_umask() -> u32 {
     std::fs::read_to_string("/proc/self/status")

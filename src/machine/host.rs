@@ -31,7 +31,7 @@ pub fn date() -> String {
     now.format("%Y-%m-%dT%H:%M:%SZ").to_string()
 }
 
-/// Memory that can still be had without swapping, in MiB. None where the system does not tell (it does on Linux).
+/// Memory available without swapping, in MiB. None where the system does not report it (Linux does).
 pub fn available_mib() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text

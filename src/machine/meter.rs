@@ -3,27 +3,39 @@
 use std::time::Instant;
 
 /// Wall time and the process's memory peak since its start.
-pub struct Meter(Instant);
+pub struct Meter {
+    since: Instant,
+    shares_process: bool,
+}
 
 impl Meter {
-    pub fn start() -> Self {
-        // Linux forgets the peak on this word; elsewhere the peak is of the process's whole life.
-        let _ = std::fs::write("/proc/self/clear_refs", "5");
-        Meter(Instant::now())
+    /// `shares_process`: other scans are worked on at the same time.
+    pub fn start(shares_process: bool) -> Self {
+        if !shares_process {
+            // Linux forgets the peak on this word; elsewhere the peak is of the process's whole life.
+            let _ = std::fs::write("/proc/self/clear_refs", "5");
+        }
+        Meter {
+            since: Instant::now(),
+            shares_process,
+        }
     }
 
     pub fn wall_s(&self) -> f64 {
-        self.0.elapsed().as_secs_f64()
+        self.since.elapsed().as_secs_f64()
     }
 
-    /// The largest resident memory in MiB; None where the system does not tell.
+    /// The largest resident memory in MiB. None where the system does not report it, and where several scans share the process.
     pub fn peak_mib(&self) -> Option<f64> {
+        if self.shares_process {
+            return None;
+        }
         let bytes = from_status().or_else(peak_bytes);
         bytes.map(|b| b / (1024.0 * 1024.0))
     }
 }
 
-/// Where Linux tells it: what `getrusage` counts there has that of the program which started this one in it.
+/// As Linux reports it. `getrusage` would include the memory of the program that started this one.
 fn from_status() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;

@@ -19,6 +19,8 @@ pub struct Session {
     pub force: bool,
     /// The scan of a run that this session is about: warnings name it.
     pub scan: Option<String>,
+    /// Other scans are worked on at the same time: the process's memory is not this one's.
+    pub shares_process: bool,
     pub output: Output,
 }
 
@@ -51,7 +53,7 @@ impl Session {
     pub fn say(&self, line: impl AsRef<str>) {
         self.note(line.as_ref());
         if !self.quiet {
-            self.output.bars.suspend(|| eprintln!("{}", line.as_ref()));
+            self.put(line.as_ref());
         }
     }
 
@@ -59,7 +61,7 @@ impl Session {
     pub fn detail(&self, line: impl AsRef<str>) {
         self.note(line.as_ref());
         if self.verbose && !self.quiet {
-            self.output.bars.suspend(|| eprintln!("{}", line.as_ref()));
+            self.put(line.as_ref());
         }
     }
 
@@ -72,9 +74,19 @@ impl Session {
     pub fn warn_of(&self, scan: Option<&str>, line: impl AsRef<str>) {
         let scan = scan.map_or(String::new(), |s| format!("{s}: "));
         self.note(&format!("warning: {}", line.as_ref()));
-        self.output
-            .bars
-            .suspend(|| eprintln!("warning: {scan}{}", line.as_ref()));
+        self.put(&format!("warning: {scan}{}", line.as_ref()));
+    }
+
+    /// What a user should know of how `scan` was understood.
+    pub fn note_of(&self, scan: &str, line: &str) {
+        self.say(format!("note: {scan}: {line}"));
+    }
+
+    /// One line on stderr. A reader that has closed it does not stop the work.
+    fn put(&self, line: &str) {
+        self.output.bars.suspend(|| {
+            let _ = writeln!(std::io::stderr(), "{line}");
+        });
     }
 
     /// A line in the log alone.

@@ -8,4 +8,5 @@ pub mod resample;
 pub mod rotate;
 pub mod threshold;
 pub mod upsample;
+pub mod usable;
 pub mod voi;

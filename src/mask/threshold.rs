@@ -3,11 +3,14 @@
 /// Bins of the histogram that Otsu's threshold is chosen from.
 pub const BINS: usize = 4096;
 
-/// Counts of values in equal bins between `min` and `max`.
+/// Counts of values in equal bins between `min` and `max`; others are left out.
 pub fn histogram(values: &[f32], min: f32, max: f32) -> Vec<u64> {
     let mut counts = vec![0u64; BINS];
     let scale = BINS as f64 / (f64::from(max) - f64::from(min));
     for &v in values {
+        if !(min..=max).contains(&v) {
+            continue;
+        }
         let bin = ((f64::from(v) - f64::from(min)) * scale) as usize;
         counts[bin.min(BINS - 1)] += 1;
     }

@@ -1,7 +1,7 @@
 //! Owns the apparent modulus of a solved specimen, `E_app = K L / A` (Zojaji et al. 2024, eq 1), three ways.
 
 /// What the solved specimen was and bore. mm and N.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Loaded {
     /// Distance of the innermost gripped planes.
     pub gauge_mm: f64,

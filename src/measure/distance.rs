@@ -105,7 +105,7 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::made::mask;
+    use crate::measure::specimens::mask;
 
     #[test]
     fn distances_are_those_of_a_search_also_for_unequal_spacing() {

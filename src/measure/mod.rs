@@ -4,10 +4,10 @@ pub mod apparent;
 pub mod distance;
 pub mod edge_blur;
 pub mod fabric;
-#[cfg(test)]
-mod made;
 pub mod morphometry;
 pub mod pistoia;
+#[cfg(test)]
+mod specimens;
 pub mod spheres;
 pub mod stiffness;
 pub mod surface_energy;

@@ -68,7 +68,7 @@ pub fn euler(bone: &Volume<u8>) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::made::mask;
+    use crate::measure::specimens::mask;
 
     #[test]
     fn euler_numbers_of_known_bodies() {

@@ -238,7 +238,7 @@ fn spread(values: impl Iterator<Item = f64>) -> Option<Spread> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::made::mask;
+    use crate::measure::specimens::mask;
 
     /// All spheres at all voxels, each voxel the largest that covers it.
     fn by_search(m: &Volume<u8>) -> Vec<f32> {

@@ -12,9 +12,9 @@ pub type Block = [[f32; 3]; 3];
 pub type VisitRow<'v, B> = dyn FnMut(usize, &[u32], &[B]) + 'v;
 
 /// An operator on displacements that algebraic multigrid can coarsen. It is never assembled: rows are made when asked
-/// for. All of it is the free operator: supports are told to the solver separately, as held components.
+/// for. All of it is the free operator: supports are passed to the solver separately, as held components.
 ///
-/// Everything is asked for by ranges of sites, on the calling thread, so that whoever asks decides how much of it is
+/// Everything is by ranges of sites, on the calling thread, so that whoever asks decides how much of it is
 /// alive at a time.
 pub trait Coarsen: Operator<3> {
     /// Where sites are, in mm. Rigid motions are made from it.
@@ -38,6 +38,32 @@ pub trait Coarsen: Operator<3> {
     fn eigenvalue_bound(&self) -> f64;
 }
 
+impl<O: Coarsen> Coarsen for &O {
+    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
+        (**self).positions(sites, x);
+    }
+
+    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
+        (**self).each_row(sites, visit);
+    }
+
+    fn reach(&self, sites: Range<usize>) -> Range<usize> {
+        (**self).reach(sites)
+    }
+
+    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        (**self).rows_f64(sites, x, y);
+    }
+
+    fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
+        (**self).rows_f32(sites, x, y);
+    }
+
+    fn eigenvalue_bound(&self) -> f64 {
+        (**self).eigenvalue_bound()
+    }
+}
+
 /// What can be applied to any range of rows needs no more than that.
 impl<O: Coarsen> MixedPrecision for O {
     fn apply_single(
@@ -53,16 +79,16 @@ impl<O: Coarsen> MixedPrecision for O {
         sum
     }
 
-    fn each_part(
+    fn for_each_chunk(
         &self,
         x: &[[f64; 3]],
         out: &mut [[f32; 3]],
-        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+        consume: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
         each_chunk(out, CHUNK, |first, out| {
             let mut image = vec![[0.0; 3]; out.len()];
             self.rows_f64(first..first + out.len(), x, &mut image);
-            take(first, &image, out)
+            consume(first, &image, out)
         })
     }
 }

@@ -18,6 +18,20 @@ pub trait Operator<const D: usize>: Sync {
     fn diagonal(&self, d: &mut [[f64; D]]);
 }
 
+impl<const D: usize, O: Operator<D>> Operator<D> for &O {
+    fn sites(&self) -> usize {
+        (**self).sites()
+    }
+
+    fn apply(&self, x: &[[f64; D]], y: &mut [[f64; D]]) {
+        (**self).apply(x, y);
+    }
+
+    fn diagonal(&self, d: &mut [[f64; D]]) {
+        (**self).diagonal(d);
+    }
+}
+
 /// An approximate inverse, symmetric and positive definite on the free unknowns: `z ≈ A⁻¹ r`.
 pub trait Preconditioner<const D: usize>: Sync {
     fn apply(&self, r: &[[f64; D]], z: &mut [[f64; D]]);
@@ -40,13 +54,13 @@ pub trait MixedPrecision: Operator<3> {
         finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
     ) -> f64;
 
-    /// `A x` in double precision, part by part, never all of it at once: `take` has each part's first site, `A x` there
+    /// `A x` in double precision, part by part, never all of it at once: `consume` has each part's first site, `A x` there
     /// and as much of `out`. What it returns is added up in the order of the parts.
-    fn each_part(
+    fn for_each_chunk(
         &self,
         x: &[[f64; 3]],
         out: &mut [[f32; 3]],
-        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+        consume: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2];
 }
 

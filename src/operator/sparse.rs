@@ -1,5 +1,5 @@
 //! Owns assembled square matrices in compressed rows: a pattern set once, values filled as often as needed, each row
-//! gathered by itself so that the result does not depend on the number of threads.
+//! summed by itself so that the result does not depend on the number of threads.
 
 use rayon::prelude::*;
 use std::ops::Range;
@@ -89,7 +89,7 @@ impl Sparse {
         range.map(|k| (self.column[k] as usize, self.value[k]))
     }
 
-    /// Sets all values anew: `gather` adds the entries of the rows it is handed.
+    /// Replaces all values: `gather` adds the entries of the rows it is handed.
     pub fn fill(&mut self, gather: impl Fn(&mut Rows) + Sync) {
         let n = self.n();
         let (start, column) = (&self.start, &self.column);
@@ -112,7 +112,7 @@ impl Sparse {
         });
     }
 
-    /// Sets all values anew, a row at a time: `gather(row, dense)` adds the row's entries to a dense row of zeros. For
+    /// Replaces all values, a row at a time: `gather(row, dense)` adds the row's entries to a dense row of zeros. For
     /// rows with many entries each added to several times; entries outside the pattern are not allowed.
     pub fn fill_rows(&mut self, gather: impl Fn(usize, &mut [f64]) + Sync) {
         let n = self.n();

@@ -2,12 +2,13 @@
 
 use crate::discretisation::lattice::connected::ConnectedSites;
 pub use crate::discretisation::lattice::placement::Boundary;
-use crate::discretisation::lattice::placement::{Frame, weigh};
+use crate::discretisation::lattice::placement::{Frame, site_weights};
 use crate::discretisation::lattice::sites::{Grips, Sites};
 pub use crate::discretisation::lattice::stencil::Structure;
-use crate::discretisation::lattice::tissue::stiffen;
+use crate::discretisation::lattice::tissue::scale_by_tissue;
 use crate::error::{Error, Result};
 use crate::grid::Axis;
+use crate::result::settings::{BoundaryRule, CellType};
 use crate::volume::Specimen;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +18,7 @@ use serde::{Deserialize, Serialize};
 pub struct LatticeParams {
     pub structure: Vec<Structure>,
     pub lp_mm: Vec<f64>,
-    pub boundary: Vec<Boundary>,
+    pub boundary: Vec<BoundaryWord>,
     /// Offset of the lattice in mm.
     pub registration_mm: [f64; 3],
 }
@@ -27,7 +28,7 @@ impl Default for LatticeParams {
         LatticeParams {
             structure: vec![Structure::Sc],
             lp_mm: vec![0.06, 0.08, 0.10, 0.12],
-            boundary: vec![Boundary::Firm, Boundary::Floppy],
+            boundary: vec![BoundaryWord::Firm, BoundaryWord::Floppy],
             registration_mm: [0.0; 3],
         }
     }
@@ -52,6 +53,11 @@ impl LatticeParams {
                 "the paper uses 0.06, 0.08, 0.10, 0.12",
             ));
         }
+        for &structure in &self.structure {
+            for word in &self.boundary {
+                word.of(structure)?;
+            }
+        }
         if self.registration_mm.iter().any(|r| !r.is_finite()) {
             return Err(Error::setting(
                 "lattice.registration_mm",
@@ -60,6 +66,50 @@ impl LatticeParams {
             ));
         }
         Ok(())
+    }
+}
+
+/// A boundary as settings name it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BoundaryWord {
+    Firm,
+    Floppy,
+    Connected,
+    Weighted,
+    /// The older word for both: connected on SC, weighted on BCC and FCC.
+    Graded,
+}
+
+impl BoundaryWord {
+    /// The boundary that is meant on a structure.
+    ///
+    /// # Errors
+    /// One that the structure does not have.
+    pub fn of(self, structure: Structure) -> Result<Boundary> {
+        match (self, structure) {
+            (BoundaryWord::Firm, _) => Ok(Boundary::Firm),
+            (BoundaryWord::Floppy, _) => Ok(Boundary::Floppy),
+            (BoundaryWord::Connected | BoundaryWord::Graded, Structure::Sc) => {
+                Ok(Boundary::Connected)
+            }
+            (BoundaryWord::Weighted | BoundaryWord::Graded, _) if structure != Structure::Sc => {
+                Ok(Boundary::Weighted)
+            }
+            (BoundaryWord::Connected, _) => Err(Error::setting(
+                "lattice.boundary",
+                format!(
+                    "connected is a method of sc lattices: cells of {} lattices overlap",
+                    structure.name()
+                ),
+                "use --structure sc, or weighted (sites weighted by bone fraction) on bcc and fcc",
+            )),
+            _ => Err(Error::setting(
+                "lattice.boundary",
+                "weighted sc lattices are refused: sites weighted by bone fraction join struts that do not touch (E_app up to 37 % too high where LP is the strut thickness)",
+                "use connected on sc, or weighted on bcc and fcc",
+            )),
+        }
     }
 }
 
@@ -73,7 +123,43 @@ pub struct Case {
 }
 
 impl LatticeParams {
-    /// All lattices asked for: structures, then lattice parameters from coarse to fine, then boundaries, floppy before
+    /// The boundaries of a structure, in the order of their rows.
+    fn boundaries(&self, structure: Structure) -> impl Iterator<Item = Boundary> {
+        let named = |boundary: &Boundary| {
+            let mut words = self.boundary.iter();
+            words.any(|word| word.of(structure).is_ok_and(|named| named == *boundary))
+        };
+        let order = [
+            Boundary::Floppy,
+            Boundary::Connected,
+            Boundary::Weighted,
+            Boundary::Firm,
+        ];
+        order
+            .into_iter()
+            .filter(named)
+            .collect::<Vec<_>>()
+            .into_iter()
+    }
+
+    /// What the older word `graded` means on these structures, where it could be mistaken.
+    pub fn note(&self) -> Option<String> {
+        let weighted = |s: &&Structure| **s != Structure::Sc;
+        let names: Vec<&str> = self
+            .structure
+            .iter()
+            .filter(weighted)
+            .map(|s| s.name())
+            .collect();
+        (self.boundary.contains(&BoundaryWord::Graded) && !names.is_empty()).then(|| {
+            format!(
+                "graded on {} is the lattice weighted by bone fraction (--boundary weighted), another method than the connected components of graded on sc (--boundary connected)",
+                names.join(" and ")
+            )
+        })
+    }
+
+    /// All lattices of the settings: structures, then lattice parameters from coarse to fine, then boundaries, floppy before
     /// firm.
     pub fn cases(&self) -> Vec<Case> {
         let mut lps = self.lp_mm.clone();
@@ -81,16 +167,14 @@ impl LatticeParams {
         let mut cases = Vec::new();
         for &structure in &self.structure {
             for &lp_mm in &lps {
-                for boundary in [Boundary::Floppy, Boundary::Graded, Boundary::Firm] {
-                    if self.boundary.contains(&boundary) {
-                        let registration_mm = self.registration_mm;
-                        cases.push(Case {
-                            structure,
-                            lp_mm,
-                            boundary,
-                            registration_mm,
-                        });
-                    }
+                for boundary in self.boundaries(structure) {
+                    let registration_mm = self.registration_mm;
+                    cases.push(Case {
+                        structure,
+                        lp_mm,
+                        boundary,
+                        registration_mm,
+                    });
                 }
             }
         }
@@ -101,13 +185,8 @@ impl LatticeParams {
 impl Case {
     /// Part of the names of its files: `sc-firm-0.06`.
     pub fn stem(&self) -> String {
-        let (structure, boundary) = (self.structure.name(), self.boundary.name());
-        format!("{structure}-{boundary}-{}", self.lp_mm)
-    }
-
-    /// Whether its sites are connected pieces of bone: graded SC lattices.
-    pub fn is_connected(&self) -> bool {
-        self.boundary == Boundary::Graded && self.structure == Structure::Sc
+        let boundary = BoundaryRule::from(self.boundary).name();
+        format!("{}-{boundary}-{}", self.structure.name(), self.lp_mm)
     }
 }
 
@@ -127,29 +206,29 @@ pub fn build_of(
     axis: Axis,
     grip_mm: f64,
 ) -> Result<Sites> {
-    let (frame, grips) = lay(specimen, case, axis, grip_mm)?;
+    let (frame, grips) = place(specimen, case, axis, grip_mm)?;
     let weights = weights(specimen, tissue, case, &frame);
     Ok(Sites::connect(frame, weights, grips))
 }
 
 /// Of every candidate of a frame.
 fn weights(specimen: &Specimen, tissue: Option<&[f32]>, case: &Case, frame: &Frame) -> Vec<f32> {
-    let mut weights = weigh(frame, &specimen.bone, case.boundary);
+    let mut weights = site_weights(frame, &specimen.bone, case.boundary);
     if let Some(tissue) = tissue {
-        stiffen(frame, &specimen.bone, tissue, &mut weights);
+        scale_by_tissue(frame, &specimen.bone, tissue, &mut weights);
     }
     weights
 }
 
 /// What each site of a lattice takes of `tissue`, a value per voxel, times its weight: as its springs are made by [`build_of`].
-pub fn values_of(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sites) -> Vec<f64> {
+pub fn site_values(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sites) -> Vec<f64> {
     let frame = &sites.frame;
     let weights = weights(specimen, Some(tissue), case, frame);
     let value = |at: &[i32; 3]| frame.candidate(*at).map_or(0.0, |c| f64::from(weights[c]));
     sites.indices.iter().map(value).collect()
 }
 
-/// [`build`] for a graded SC lattice: a site for each connected piece of bone in a cell.
+/// [`build`] for a connected lattice: a site for each connected component of bone in a cell.
 ///
 /// # Errors
 /// As [`build`].
@@ -165,11 +244,11 @@ pub fn build_connected(
         registration_mm: case.registration_mm.map(|r| r - lp * (r / lp).round()),
         ..*case
     };
-    let (frame, grips) = lay(specimen, &wrapped, axis, grip_mm)?;
+    let (frame, grips) = place(specimen, &wrapped, axis, grip_mm)?;
     Ok(ConnectedSites::connect(frame, &specimen.bone, grips))
 }
 
-fn lay(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Frame, Grips)> {
+fn place(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Frame, Grips)> {
     let frame = Frame::new(
         &specimen.bone.grid,
         case.structure,
@@ -196,14 +275,14 @@ fn lay(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Fr
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LatticeSummary {
     pub structure: Structure,
-    pub boundary: Boundary,
+    pub boundary: BoundaryRule,
     pub lp_mm: f64,
     pub sites: usize,
     pub bonds: usize,
     pub fully_coordinated_sites: usize,
     /// Sites without a path of bonds to both grips.
     pub dropped_sites: usize,
-    /// Volume of the sites' cells (graded: their bone) over TV.
+    /// Volume of the sites' cells (connected, weighted: of their bone) over TV.
     pub lattice_bv_tv: f64,
 }
 
@@ -214,7 +293,7 @@ pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSumm
         .map_or(sites.len() as f64, |w| w.iter().sum());
     LatticeSummary {
         structure: case.structure,
-        boundary: case.boundary,
+        boundary: case.boundary.into(),
         lp_mm: case.lp_mm,
         sites: sites.len(),
         bonds: sites.bonds(),
@@ -226,27 +305,27 @@ pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSumm
     }
 }
 
-/// [`summarise`] for a lattice of pieces. Fully coordinated are those with a neighbour along every bond.
+/// [`summarise`] for a connected lattice. Fully coordinated are those with a neighbour along every bond.
 pub fn summarise_connected(
     specimen: &Specimen,
     case: &Case,
-    pieces: &ConnectedSites,
+    sites: &ConnectedSites,
 ) -> LatticeSummary {
-    let bone: f64 = pieces.fractions.iter().map(|&f| f64::from(f)).sum();
+    let bone: f64 = sites.fractions.iter().map(|&f| f64::from(f)).sum();
     let directions = case.structure.stencil().coordination();
     let whole = |s: &usize| {
         let mut met = vec![false; directions];
-        pieces.bonds.of(*s).for_each(|(_, b, _)| met[b] = true);
+        sites.bonds.of(*s).for_each(|(_, b, _)| met[b] = true);
         met.into_iter().all(|met| met)
     };
     LatticeSummary {
         structure: case.structure,
-        boundary: case.boundary,
+        boundary: case.boundary.into(),
         lp_mm: case.lp_mm,
-        sites: pieces.len(),
-        bonds: pieces.pairs().count(),
-        fully_coordinated_sites: (0..pieces.len()).filter(whole).count(),
-        dropped_sites: pieces.dropped,
+        sites: sites.len(),
+        bonds: sites.pairs().count(),
+        fully_coordinated_sites: (0..sites.len()).filter(whole).count(),
+        dropped_sites: sites.dropped,
         lattice_bv_tv: bone * case.lp_mm.powi(3) / specimen.tv_mm3,
     }
 }
@@ -255,9 +334,9 @@ impl LatticeSummary {
     /// One line for a person.
     pub fn in_words(&self) -> String {
         format!(
-            "{} {:<7} {:>6} mm  {:>9} sites  {:>10} bonds  {:>9} fully coordinated  {:>6} dropped  lattice BV/TV {:.4}",
+            "{} {:<9} {:>6} mm  {:>9} sites  {:>10} bonds  {:>9} fully coordinated  {:>6} dropped  lattice BV/TV {:.4}",
             self.structure.name(),
-            self.boundary.name(),
+            self.boundary.method_name(CellType::Lattice(self.structure)),
             self.lp_mm,
             self.sites,
             self.bonds,
@@ -265,5 +344,54 @@ impl LatticeSummary {
             self.dropped_sites,
             self.lattice_bv_tv,
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn params(structure: &[Structure], boundary: &[BoundaryWord]) -> LatticeParams {
+        LatticeParams {
+            structure: structure.to_vec(),
+            lp_mm: vec![0.1],
+            boundary: boundary.to_vec(),
+            ..LatticeParams::default()
+        }
+    }
+
+    #[test]
+    fn the_older_word_means_connected_on_sc_and_weighted_elsewhere() {
+        use BoundaryWord::{Connected, Graded, Weighted};
+        let graded = params(&Structure::ALL, &[Graded]);
+        graded.check().unwrap();
+        let meant: Vec<Boundary> = graded.cases().iter().map(|case| case.boundary).collect();
+        let wanted = [Boundary::Connected, Boundary::Weighted, Boundary::Weighted];
+        assert_eq!(meant, wanted);
+        assert!(graded.note().unwrap().contains("bcc and fcc"));
+        assert_eq!(params(&[Structure::Sc], &[Graded]).note(), None);
+        // Named twice, solved once; files say the older word.
+        let twice = params(&[Structure::Sc], &[Connected, Graded]).cases();
+        assert_eq!(twice, params(&[Structure::Sc], &[Graded]).cases());
+        assert_eq!(twice[0].stem(), "sc-graded-0.1");
+        assert_eq!(
+            params(&[Structure::Bcc], &[Weighted]).cases()[0].stem(),
+            "bcc-graded-0.1"
+        );
+    }
+
+    #[test]
+    fn a_boundary_that_a_structure_does_not_have_is_refused() {
+        let refused = |structure, word| {
+            let words = params(&[structure], &[BoundaryWord::Firm, word]).check();
+            words.unwrap_err().to_string()
+        };
+        let words = refused(Structure::Bcc, BoundaryWord::Connected);
+        assert!(
+            words.contains("weighted") && words.contains("bcc"),
+            "{words}"
+        );
+        let words = refused(Structure::Sc, BoundaryWord::Weighted);
+        assert!(words.contains("use connected on sc"), "{words}");
     }
 }

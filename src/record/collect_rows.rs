@@ -4,21 +4,20 @@ use crate::error::{Error, Result};
 use crate::io::table;
 use crate::machine::session::Session;
 use crate::record::failures::{Failure, failures_in};
+use crate::record::results::TABLE;
 use crate::record::specimen;
 use crate::result::row::Row;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-const TABLE: &str = "results.csv";
-
 /// Rows of all scans read so far, and the scans that have none.
 #[derive(Debug, Default)]
-pub struct Solved {
+pub struct CollectedRows {
     pub rows: Vec<Row>,
     pub failures: Vec<Failure>,
 }
 
-impl Solved {
+impl CollectedRows {
     /// Adds the rows of a solved scan's folder, or of the output of a run: of scans in it that were solved again since, the
     /// rows in their own folders, in place of those of the run.
     ///

@@ -1,28 +1,28 @@
-//! Owns the note on rows that do not come to the stated error asked for.
+//! Owns the note on rows whose stated error is above the requested one.
 
 use crate::result::row::Row;
 use crate::result::settings::{BoundaryRule, Settings};
 
 /// How the note begins.
-const MISSED: &str = "the error asked for, ";
+const PREFIX: &str = "the error asked for, ";
 
-/// What is to be said, and of which solve.
-pub struct Missed {
+/// The note, and the solve it is about.
+pub struct ErrorTargetNote {
     nearest: Option<Settings>,
     words: String,
 }
 
-impl Missed {
-    /// `nearest` is the row that comes nearest to what was asked for; `words` go on from "the error asked for, ".
-    pub fn of(nearest: Option<&Row>, words: String) -> Missed {
-        Missed {
+impl ErrorTargetNote {
+    /// `nearest` is the row with the smallest stated error; `words` follow "the error asked for, ".
+    pub fn of(nearest: Option<&Row>, words: String) -> ErrorTargetNote {
+        ErrorTargetNote {
             nearest: nearest.map(|row| row.key.clone()),
-            words: format!("{MISSED}{words}"),
+            words: format!("{PREFIX}{words}"),
         }
     }
 
     /// Adds to the note of the row, if it is that solve, or the limit that takes it for its finest.
-    pub fn note(&self, row: &mut Row) {
+    pub fn add_to(&self, row: &mut Row) {
         let note = &mut row.marks.note;
         let noted = note.as_ref().is_some_and(|n| n.contains(&self.words));
         let same = self
@@ -38,12 +38,12 @@ impl Missed {
         });
     }
 
-    /// Takes such a note off the row.
-    pub fn take_back(row: &mut Row) {
+    /// Removes such a note from the row.
+    pub fn remove_note(row: &mut Row) {
         let Some(note) = row.marks.note.take() else {
             return;
         };
-        let parts = note.split("; ").filter(|part| !part.starts_with(MISSED));
+        let parts = note.split("; ").filter(|part| !part.starts_with(PREFIX));
         let kept: Vec<&str> = parts.collect();
         row.marks.note = (!kept.is_empty()).then(|| kept.join("; "));
     }
@@ -87,10 +87,10 @@ mod tests {
     #[test]
     fn a_limit_and_its_finest_solve_say_what_was_missed() {
         let limit = row(Some(BoundaryRule::Extrapolated), 0.02, Some("limit of two"));
-        let missed = Missed::of(Some(&limit), "3 %, is not met".to_owned());
+        let note = ErrorTargetNote::of(Some(&limit), "3 %, is not met".to_owned());
         let noted = |mut row: Row| {
-            missed.note(&mut row);
-            missed.note(&mut row);
+            note.add_to(&mut row);
+            note.add_to(&mut row);
             row.marks.note
         };
         let words = "the error asked for, 3 %, is not met";
@@ -101,13 +101,13 @@ mod tests {
     }
 
     #[test]
-    fn what_was_said_of_an_earlier_target_is_taken_back() {
+    fn the_note_of_an_earlier_target_is_removed() {
         for note in [None, Some("no path")] {
             let before = row(None, 0.02, note);
             let mut after = before.clone();
-            Missed::of(Some(&before), "3 %, is not met".to_owned()).note(&mut after);
+            ErrorTargetNote::of(Some(&before), "3 %, is not met".to_owned()).add_to(&mut after);
             assert_ne!(after, before);
-            Missed::take_back(&mut after);
+            ErrorTargetNote::remove_note(&mut after);
             assert_eq!(after, before);
         }
     }

@@ -28,7 +28,13 @@ pub fn write(path: &Path, frames: &[Frame]) -> Result<()> {
 
 /// The first `rows` rows of what [`write()`] left, as frames without fields.
 pub fn read(path: &Path, rows: usize) -> Result<Vec<Frame>> {
-    let bad = |found: String| Error::file(path, found, "start the scene anew with --force");
+    let bad = |found: String| {
+        Error::file(
+            path,
+            found,
+            "start the scene from the beginning with --force",
+        )
+    };
     let mut reader =
         csv::Reader::from_path(path).map_err(|e| bad(format!("cannot be read: {e}")))?;
     let header = reader.headers().map_err(|e| bad(e.to_string()))?.clone();

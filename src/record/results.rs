@@ -7,6 +7,7 @@ use crate::io::{atomic, table};
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::pipeline::apparent::SolveParams;
+use crate::record::specimen;
 use crate::result::extrapolate::with_extrapolated;
 use crate::result::ffb::with_ffb;
 use crate::result::row::Row;
@@ -16,6 +17,9 @@ use std::path::{Path, PathBuf};
 
 /// The rows of a scan, or of a run, for other programs.
 pub const TABLE: &str = "results.csv";
+
+/// The same with provenance.
+const RECORD: &str = "results.json";
 
 /// Where the rows of an earlier mask, or of a scan that failed since, are set aside; gone with the next solve.
 const OLD_TABLE: &str = "results.old.csv";
@@ -102,7 +106,7 @@ impl Results {
         let mut rows = old
             .filter(|r| !redo && same(r))
             .map_or(Vec::new(), |r| r.rows);
-        // Means are made anew from what was solved.
+        // Means are computed again from what was solved.
         rows.retain(|row| row.key.is_some());
         Ok(Results {
             dir: dir.to_path_buf(),
@@ -122,8 +126,8 @@ impl Results {
             .map(|old| old.row.clone())
     }
 
-    /// Keeps a solved row, in place of an older one of the same settings, and writes both files.
-    pub fn keep(&mut self, blank: &Row, params: &SolveParams, row: &Row) -> Result<()> {
+    /// Stores a solved row, in place of an older one of the same settings, and writes both files.
+    pub fn store(&mut self, blank: &Row, params: &SolveParams, row: &Row) -> Result<()> {
         let mut new = KeyedRow {
             row: row.clone(),
             key: Some(key(blank, params)),
@@ -133,6 +137,7 @@ impl Results {
             (new.row.marks.group, new.row.marks.subject) =
                 (old.marks.group.clone(), old.marks.subject.clone());
         }
+        self.record.provenance.date = host::date();
         match self.record.rows.iter_mut().find(|old| old.key == new.key) {
             Some(old) => *old = new,
             None => self.record.rows.push(new),
@@ -153,8 +158,8 @@ impl Results {
         if changed { self.write() } else { Ok(()) }
     }
 
-    /// Lets `change` look at, and change, the note of each solved row.
-    pub fn renote(&mut self, change: impl Fn(&mut Row)) -> Result<()> {
+    /// Lets `change` edit each solved row, and writes what has changed.
+    pub fn edit_rows(&mut self, change: impl Fn(&mut Row)) -> Result<()> {
         let before = self.record.rows.clone();
         self.record
             .rows
@@ -166,12 +171,18 @@ impl Results {
         }
     }
 
-    /// Drops what is kept in `dir`.
+    /// BLAKE3 of the mask that the results are of.
+    pub fn mask_blake3(&self) -> &str {
+        &self.record.provenance.mask_blake3
+    }
+
+    /// Drops all rows.
     ///
     /// # Errors
-    /// As [`Results::open`], and files that cannot be written.
-    pub fn begin_anew(dir: &Path) -> Result<()> {
-        Results::open(dir, true)?.write()
+    /// Files that cannot be written.
+    pub fn clear(&mut self) -> Result<()> {
+        self.record.rows.clear();
+        self.write()
     }
 
     fn write(&self) -> Result<()> {
@@ -199,7 +210,7 @@ impl Results {
             rows: rows.iter().map(keyed).collect(),
         };
         let text = serde_json::to_string_pretty(&record).expect("plain data");
-        atomic::write(&self.dir.join("results.json"), text)?;
+        atomic::write(&self.dir.join(RECORD), text)?;
         write_table(&self.dir, &rows)
     }
 }
@@ -207,14 +218,14 @@ impl Results {
 impl Record {
     /// None where there is none, or an older program wrote another kind.
     fn read(dir: &Path) -> Option<Self> {
-        let text = std::fs::read(dir.join("results.json")).ok()?;
+        let text = std::fs::read(dir.join(RECORD)).ok()?;
         serde_json::from_slice(&text).ok()
     }
 }
 
 impl Provenance {
     fn now(dir: &Path) -> Result<Self> {
-        let mask = dir.join("mask.nii.gz");
+        let mask = dir.join(specimen::MASK);
         let bytes = std::fs::read(&mask).map_err(|e| {
             Error::file(
                 &mask,
@@ -222,7 +233,7 @@ impl Provenance {
                 "run `bonepd-ct segment` first",
             )
         })?;
-        let segment = std::fs::read(dir.join("segment.json")).unwrap_or_default();
+        let segment = std::fs::read(dir.join(specimen::RECORD)).unwrap_or_default();
         Ok(Provenance {
             program: env!("CARGO_PKG_NAME").to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -235,7 +246,7 @@ impl Provenance {
     }
 }
 
-/// What a row follows from, beside the mask and the version: its lattice and all settings, also those without a column.
+/// Key of what a row follows from, apart from the mask and the version: its lattice and all settings, also those without a column.
 fn key(blank: &Row, params: &SolveParams) -> String {
     let all = serde_json::json!([blank, params]);
     blake3::hash(all.to_string().as_bytes()).to_hex()[..32].to_owned()
@@ -273,7 +284,7 @@ mod tests {
 
     fn folder() -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
-        std::fs::write(dir.path().join("mask.nii.gz"), "mask").unwrap();
+        std::fs::write(dir.path().join(specimen::MASK), "mask").unwrap();
         dir
     }
 
@@ -283,10 +294,10 @@ mod tests {
         let params = SolveParams::default();
         let mut results = Results::open(dir.path(), false).unwrap();
         results
-            .keep(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0))
+            .store(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0))
             .unwrap();
         results
-            .keep(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1))
+            .store(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1))
             .unwrap();
 
         let again = Results::open(dir.path(), false).unwrap();
@@ -299,7 +310,7 @@ mod tests {
             ..params.clone()
         };
         assert_eq!(again.find(&blank(FIRM), &tighter), None);
-        let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
+        let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
         assert_eq!(table.len(), 3);
         assert_eq!(table[2].key.boundary, Some(BoundaryRule::Ffb));
 
@@ -309,7 +320,7 @@ mod tests {
                 .find(&blank(FIRM), &params),
             None
         );
-        std::fs::write(dir.path().join("mask.nii.gz"), "another").unwrap();
+        std::fs::write(dir.path().join(specimen::MASK), "another").unwrap();
         assert_eq!(
             Results::open(dir.path(), false)
                 .unwrap()
@@ -325,12 +336,12 @@ mod tests {
         let mut results = Results::open(dir.path(), false).unwrap();
         let mut stalled = solved(FIRM, 2.0);
         stalled.solved.as_mut().unwrap().converged = Some(false);
-        results.keep(&blank(FIRM), &params, &stalled).unwrap();
+        results.store(&blank(FIRM), &params, &stalled).unwrap();
         assert_eq!(results.find(&blank(FIRM), &params), None);
         results
-            .keep(&blank(FIRM), &params, &solved(FIRM, 1.0))
+            .store(&blank(FIRM), &params, &solved(FIRM, 1.0))
             .unwrap();
-        let table: Vec<Row> = table::read(&dir.path().join("results.csv")).unwrap();
+        let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
         assert_eq!(table, [solved(FIRM, 1.0)]);
     }
 }

@@ -1,20 +1,15 @@
 //! Owns the segmented scan on disk: `mask.nii.gz` and `segment.json`, written and read back.
 
 use crate::error::{Error, Result};
+use crate::image::orient::{self, Turn};
 use crate::image::{nifti, scan};
 use crate::io::atomic;
-use crate::pipeline::segment::{SegmentParams, SegmentSummary, Surface};
+pub use crate::io::own_files::{GREY, MASK, PICTURE, RECORD, VOI};
+use crate::pipeline::segment::{SegmentParams, SegmentSummary, Surface, shown};
 use crate::result::shape::Image;
 use crate::volume::{Specimen, Threshold, Volume};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-
-pub const MASK: &str = "mask.nii.gz";
-pub const RECORD: &str = "segment.json";
-pub const GREY: &str = "grey.nii.gz";
-/// The volume of interest, where it is not the whole box.
-pub const VOI: &str = "voi.nii.gz";
-pub const PICTURE: &str = "segment.png";
 
 /// `segment.json`: what was segmented, how, and what came out; enough to repeat it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,27 +25,33 @@ pub struct SegmentRecord {
 /// The scan that was read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Input {
+    #[serde(serialize_with = "shown")]
     pub path: PathBuf,
     /// Of the file, or of the names and contents of a folder's slices.
     pub blake3: String,
     /// Of the mask that is the volume of interest, where one is.
     pub voi_blake3: Option<String>,
     pub format: String,
-    /// Unit of the grey values where the file tells.
+    /// Unit of the grey values where the file states it.
     pub unit: Option<String>,
+    /// From the file's axes to x, y, z of the results. Mask, grey values and fields are written in the file's order.
+    #[serde(default)]
+    pub axes: Turn,
     pub notes: Vec<String>,
 }
 
 /// Writes mask and record. The record goes last: where it is, the mask is whole.
 pub fn write(dir: &Path, specimen: &Specimen, record: &SegmentRecord) -> Result<()> {
-    nifti::write(&dir.join(MASK), &specimen.bone)?;
+    let back = record.input.axes.inverse();
+    let bone = specimen.bone.clone();
+    nifti::write(&dir.join(MASK), &orient::turned(bone, &back))?;
     match &specimen.grey {
-        Some(grey) => nifti::write(&dir.join(GREY), grey)?,
+        Some(grey) => nifti::write(&dir.join(GREY), &orient::turned(grey.clone(), &back))?,
         None => drop(std::fs::remove_file(dir.join(GREY))),
     }
     let inside = specimen.threshold.as_ref().and_then(|t| t.inside.as_ref());
     match inside.filter(|_| specimen.grey.is_some()) {
-        Some(inside) => nifti::write(&dir.join(VOI), inside)?,
+        Some(inside) => nifti::write(&dir.join(VOI), &orient::turned(inside.clone(), &back))?,
         None => drop(std::fs::remove_file(dir.join(VOI))),
     }
     let json = serde_json::to_string_pretty(record).expect("records are plain data");
@@ -61,6 +62,11 @@ pub fn write(dir: &Path, specimen: &Specimen, record: &SegmentRecord) -> Result<
 pub fn record(dir: &Path) -> Option<SegmentRecord> {
     let text = std::fs::read_to_string(dir.join(RECORD)).ok()?;
     serde_json::from_str(&text).ok()
+}
+
+/// From the order of the files of voxels in `dir` to x, y, z of the results.
+pub fn axes(dir: &Path) -> Turn {
+    record(dir).map_or(Turn::default(), |record| record.input.axes)
 }
 
 /// The specimen that `segment` left in `dir`.
@@ -77,7 +83,8 @@ pub fn load(dir: &Path) -> Result<Specimen> {
         )
     })?;
     let mask = dir.join(MASK);
-    let stored = scan::read_as_stored(&mask, record.results.spacing_mm)?;
+    let axes = record.input.axes;
+    let stored = scan::read_turned(&mask, &axes, record.results.spacing_mm)?;
     if stored.grid.n != record.results.voxels {
         return Err(Error::file(
             &mask,
@@ -119,13 +126,12 @@ pub fn add_grey(dir: &Path, specimen: &mut Specimen) -> Result<()> {
     if !path.exists() {
         return Ok(());
     }
-    specimen.grey = Some(on_grid_of(&specimen.bone, &path)?);
+    specimen.grey = Some(on_grid_of(dir, &specimen.bone, GREY)?);
     let Some(record) = record(dir).filter(|r| r.results.surface == Surface::Grey) else {
         return Ok(());
     };
-    let voi = dir.join(VOI);
-    let inside = match voi.exists() {
-        true => Some(mask_of(&on_grid_of(&specimen.bone, &voi)?)),
+    let inside = match dir.join(VOI).exists() {
+        true => Some(mask_of(&on_grid_of(dir, &specimen.bone, VOI)?)),
         false => None,
     };
     let (lower, upper) = (record.results.lower, record.results.upper);
@@ -139,8 +145,10 @@ pub fn add_grey(dir: &Path, specimen: &mut Specimen) -> Result<()> {
     Ok(())
 }
 
-fn on_grid_of(bone: &Volume<u8>, path: &Path) -> Result<Volume<f32>> {
-    let volume = scan::read_as_stored(path, bone.grid.spacing_mm)?;
+/// A file of `dir` along the axes of the mask.
+fn on_grid_of(dir: &Path, bone: &Volume<u8>, file: &str) -> Result<Volume<f32>> {
+    let path = &dir.join(file);
+    let volume = scan::read_turned(path, &axes(dir), bone.grid.spacing_mm)?;
     if volume.grid.n != bone.grid.n {
         return Err(Error::file(
             path,
@@ -154,12 +162,8 @@ fn on_grid_of(bone: &Volume<u8>, path: &Path) -> Result<Volume<f32>> {
     Ok(volume)
 }
 
-/// A mask from any image: non-zero is inside.
-pub fn read_mask(path: &Path, spacing_mm: Option<[f64; 3]>) -> Result<Volume<u8>> {
-    Ok(mask_of(&scan::read(path, spacing_mm)?.volume))
-}
-
-fn mask_of(volume: &Volume<f32>) -> Volume<u8> {
+/// Non-zero is inside.
+pub fn mask_of(volume: &Volume<f32>) -> Volume<u8> {
     let voxels = volume.as_slice().iter();
     let voxels = voxels.map(|&v| u8::from(v != 0.0 && !v.is_nan()));
     let mut mask = Volume::from_vec(volume.grid, voxels.collect());

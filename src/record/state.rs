@@ -11,7 +11,7 @@ const HASH: usize = 32;
 
 /// What a file holds for a scene.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kept {
+pub enum StateFile {
     Nothing,
     /// Why it cannot be used.
     Unusable(&'static str),
@@ -33,20 +33,20 @@ pub fn write(path: &Path, fingerprint: &str, state: &State) -> Result<()> {
 }
 
 /// Reads what [`write()`] left for the scene of this fingerprint.
-pub fn read(path: &Path, fingerprint: &str) -> Kept {
+pub fn read(path: &Path, fingerprint: &str) -> StateFile {
     let Ok(bytes) = std::fs::read(path) else {
-        return Kept::Nothing;
+        return StateFile::Nothing;
     };
     let (body, hash) = bytes.split_at(bytes.len().saturating_sub(HASH));
     if blake3::hash(body).as_bytes() != hash {
-        return Kept::Unusable("it is damaged");
+        return StateFile::Unusable("it is damaged");
     }
     let Some(body) = body.strip_prefix(FORMAT.as_bytes()) else {
-        return Kept::Unusable("it is of another version");
+        return StateFile::Unusable("it is of another version");
     };
     match body.strip_prefix(format!("{fingerprint}\n").as_bytes()) {
-        Some(body) => arrays(body).map_or(Kept::Unusable("it is damaged"), Kept::State),
-        None => Kept::Unusable("it is of another scene"),
+        Some(body) => arrays(body).map_or(StateFile::Unusable("it is damaged"), StateFile::State),
+        None => StateFile::Unusable("it is of another scene"),
     }
 }
 
@@ -76,18 +76,20 @@ mod tests {
     fn a_state_is_read_back_and_others_are_not() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("state.bin");
-        assert_eq!(read(&path, "a"), Kept::Nothing);
+        assert_eq!(read(&path, "a"), StateFile::Nothing);
         let mut state = State::default();
         state.put("q", [0.1, -f64::MIN_POSITIVE, 1e300]);
         state.put("none", []);
         write(&path, "a", &state).unwrap();
-        assert_eq!(read(&path, "a"), Kept::State(state));
-        assert!(matches!(read(&path, "b"), Kept::Unusable(why) if why.contains("another scene")));
+        assert_eq!(read(&path, "a"), StateFile::State(state));
+        assert!(
+            matches!(read(&path, "b"), StateFile::Unusable(why) if why.contains("another scene"))
+        );
         let mut bytes = std::fs::read(&path).unwrap();
         bytes[70] ^= 1;
         std::fs::write(&path, &bytes).unwrap();
-        assert!(matches!(read(&path, "a"), Kept::Unusable(why) if why.contains("damaged")));
+        assert!(matches!(read(&path, "a"), StateFile::Unusable(why) if why.contains("damaged")));
         std::fs::write(&path, &bytes[..9]).unwrap();
-        assert!(matches!(read(&path, "a"), Kept::Unusable(_)));
+        assert!(matches!(read(&path, "a"), StateFile::Unusable(_)));
     }
 }

@@ -6,6 +6,7 @@ use super::{Model, distinct};
 use crate::result::row::Row;
 use crate::result::settings::CellType;
 use crate::result::statistics::regression::regression;
+use std::collections::HashSet;
 
 /// Curves of one colour and marker: one structure, one model, one set of settings.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,17 +17,17 @@ struct Family {
 }
 
 /// A row with what a figure needs of it.
-struct Solved<'a> {
+struct SolvedRow<'a> {
     row: &'a Row,
     family: Family,
     e_app_mpa: f64,
 }
 
-fn solved(rows: &[Row]) -> Vec<Solved<'_>> {
+fn solved(rows: &[Row]) -> Vec<SolvedRow<'_>> {
     let varying = varying_settings(rows);
     rows.iter()
         .filter_map(|row| {
-            Some(Solved {
+            Some(SolvedRow {
                 family: Family {
                     structure: row.key.structure,
                     model: Model::of(row)?,
@@ -41,9 +42,9 @@ fn solved(rows: &[Row]) -> Vec<Solved<'_>> {
 
 /// A curve per family, `points` of each. Names say only what tells the curves apart.
 fn curves<'a>(
-    solved: &[Solved<'a>],
+    solved: &[SolvedRow<'a>],
     mark: Mark,
-    points: impl Fn(&[&Solved<'a>]) -> Vec<Point>,
+    points: impl Fn(&[&SolvedRow<'a>]) -> Vec<Point>,
 ) -> Vec<Curve> {
     let families = distinct(solved.iter().map(|s| s.family.clone()));
     let lattices = distinct(
@@ -54,7 +55,7 @@ fn curves<'a>(
     );
     let conditions = distinct(families.iter().map(|f| &f.condition));
     let curve = |family: &Family| {
-        let members: Vec<&Solved> = solved.iter().filter(|s| s.family == *family).collect();
+        let members: Vec<&SolvedRow> = solved.iter().filter(|s| s.family == *family).collect();
         let lattice = lattices.iter().position(|s| *s == &family.structure);
         let condition = conditions.iter().position(|c| *c == &family.condition);
         let mut name = match lattice {
@@ -98,11 +99,24 @@ pub fn convergence(rows: &[Row]) -> Vec<Figure> {
         .collect()
 }
 
-fn convergence_of(scan: &str, solved: &[Solved]) -> Figure {
+/// Gives each figure a file of its own: names that differ in characters no file system takes, or in case only, are numbered.
+pub fn with_own_files(figures: &mut [Figure]) {
+    let mut used = HashSet::new();
+    for figure in figures {
+        let plain = figure.stem.clone();
+        let mut number = 1;
+        while !used.insert(figure.stem.to_lowercase()) {
+            number += 1;
+            figure.stem = format!("{plain}-{number}");
+        }
+    }
+}
+
+fn convergence_of(scan: &str, solved: &[SolvedRow]) -> Figure {
     let (levels, found): (Vec<_>, Vec<_>) = solved
         .iter()
         .filter(|s| s.row.key.scan == scan)
-        .map(|s| Solved {
+        .map(|s| SolvedRow {
             family: s.family.clone(),
             ..*s
         })
@@ -129,7 +143,7 @@ fn convergence_of(scan: &str, solved: &[Solved]) -> Figure {
 }
 
 /// The stated algebraic and discretisation errors together, where there are any.
-fn with_error(s: &Solved) -> Point {
+fn with_error(s: &SolvedRow) -> Point {
     let errors = s.row.stated_errors_mpa();
     let stated = errors.iter().flatten().count() > 0;
     let error: f64 = errors.iter().flatten().map(|e| e.abs()).sum();
@@ -183,7 +197,7 @@ fn least_squares(curve: &Curve) -> Option<Curve> {
 }
 
 /// Of each scan the member with the smallest lattice parameter.
-fn finest<'a, 'b>(members: &[&'b Solved<'a>]) -> Vec<&'b Solved<'a>> {
+fn finest<'a, 'b>(members: &[&'b SolvedRow<'a>]) -> Vec<&'b SolvedRow<'a>> {
     let scans = distinct(members.iter().map(|s| &s.row.key.scan));
     let of = |scan| {
         let own = members.iter().filter(|s| &s.row.key.scan == scan);
@@ -241,14 +255,14 @@ pub fn speed_error(rows: &[Row]) -> Option<Figure> {
         distinct(all.iter().map(|s| (&s.row.key.scan, &s.family.condition)))
             .into_iter()
             .filter_map(|(scan, condition)| {
-                let own: Vec<&Solved> = all
+                let own: Vec<&SolvedRow> = all
                     .iter()
                     .filter(|s| &s.row.key.scan == scan && &s.family.condition == condition)
                     .collect();
                 Some((scan, condition, reference(&own)?))
             })
             .collect();
-    let error_of = |s: &Solved| {
+    let error_of = |s: &SolvedRow| {
         let (_, _, truth) = references.iter().find(|(scan, condition, _)| {
             *scan == &s.row.key.scan && *condition == &s.family.condition
         })?;
@@ -272,7 +286,7 @@ pub fn speed_error(rows: &[Row]) -> Option<Figure> {
     })
 }
 
-fn reference(own: &[&Solved]) -> Option<f64> {
+fn reference(own: &[&SolvedRow]) -> Option<f64> {
     let extrapolated = own.iter().find(|s| s.family.model == Model::VoxelFeLimit);
     let finest = own
         .iter()

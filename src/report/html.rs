@@ -87,7 +87,6 @@ pub fn render(report: &Report, pages: &[ScanPage], source: &Source) -> Result<St
         boxes => plain(&records(&statistics.boxes)),
         anova => plain(&statistics.anova),
         figures => plain(&figures),
-        validation => plain(&validation()),
         pages => plain(&pages),
     };
     let mut environment = Environment::new();
@@ -126,26 +125,6 @@ fn shown(figure: &Figure) -> Shown<'_> {
         title: &figure.title,
         caption: &figure.caption,
         svg: scalable(svg).replace("kuva-clip-", &format!("{}-clip-", figure.stem)),
-    }
-}
-
-/// The table of `reports/validation.md`, so that the page and the repository say the same.
-fn validation() -> Table {
-    let page = include_str!("../../reports/validation.md");
-    let rows = page.lines().filter_map(|line| {
-        let inner = line.trim().strip_prefix("| ")?.strip_suffix(" |")?;
-        Some(inner.split(" | ").map(|cell| cell.replace('`', "")))
-    });
-    // The first table of the file: head, rule, lines up to the next head.
-    let mut rows = rows.map(Iterator::collect::<Vec<String>>);
-    let head = rows.next().unwrap_or_default();
-    let body = rows
-        .skip(1)
-        .take_while(|cells| cells.len() == head.len() && !cells[0].starts_with("---"))
-        .map(|cells| cells.iter().map(|words| text(words)).collect());
-    Table {
-        body: body.collect(),
-        head,
     }
 }
 
@@ -333,11 +312,15 @@ mod tests {
         }
     }
 
+    /// A reader of the page has no repository.
     #[test]
-    fn the_table_of_validation_is_found() {
-        let table = validation();
-        assert_eq!(table.head[0], "what");
-        assert!(table.body.len() > 8, "{} lines", table.body.len());
+    fn a_page_is_about_its_scans_alone() {
+        let report = crate::report::report(&[], &Default::default());
+        let page = render(&report, &[], &Source::default()).unwrap();
+        assert!(page.contains("Recipe and provenance"));
+        for words in ["cargo ", "reports/", "Validation"] {
+            assert!(!page.contains(words), "{words}");
+        }
     }
 
     #[test]

@@ -11,7 +11,6 @@ mod sample;
 pub mod statistics;
 pub mod table;
 
-use crate::discretisation::lattice::placement::Boundary;
 use crate::result::row::Row;
 use crate::result::settings::{BoundaryRule, Method};
 use figure::Figure;
@@ -55,6 +54,7 @@ pub fn report(rows: &[Row], params: &ReportParams) -> Report {
     figures.extend(curves::speed_error(rows));
     let (samples, left_out) = sample::samples(rows);
     figures.extend(comparison::figures(&samples));
+    curves::with_own_files(&mut figures);
     let statistics = statistics::statistics(&samples);
     let mut notes = notes(rows);
     notes.extend(left_out);
@@ -125,17 +125,17 @@ impl Model {
         Model::VoxelFeLimit,
     ];
 
-    /// None for a lattice without a boundary, which no table holds that this program wrote.
+    /// None for a method without a column: its rows stand in the table of results alone.
     pub fn of(row: &Row) -> Option<Model> {
         Some(match (row.key.boundary, row.key.method) {
-            (Some(BoundaryRule::Sites(Boundary::Floppy)), _) => Model::Floppy,
-            (Some(BoundaryRule::Sites(Boundary::Firm)), _) => Model::Firm,
-            (Some(BoundaryRule::Sites(Boundary::Graded)), _) => Model::Graded,
+            (Some(BoundaryRule::Floppy), _) => Model::Floppy,
+            (Some(BoundaryRule::Firm), _) => Model::Firm,
+            (Some(BoundaryRule::Graded), _) => Model::Graded,
             (Some(BoundaryRule::Ffb), _) => Model::Ffb,
-            (Some(BoundaryRule::Extrapolated), Method::Lattice) => Model::GradedLimit,
             (Some(BoundaryRule::Extrapolated), Method::VoxelFe) => Model::VoxelFeLimit,
+            (Some(BoundaryRule::Extrapolated), _) => Model::GradedLimit,
             (None, Method::VoxelFe) => Model::VoxelFe,
-            (None, Method::Lattice) => return None,
+            (None, _) => return None,
         })
     }
 
@@ -233,6 +233,22 @@ mod tests {
         stalled.solved.as_mut().unwrap().converged = Some(false);
         let report = report(&[stalled], &ReportParams::default());
         assert_eq!(report.notes, ["a: not converged (SC floppy 0.1 mm)"]);
+    }
+
+    #[test]
+    fn scans_of_like_names_have_figures_of_their_own() {
+        let names = ["scan 1", "scan_1", "SCAN_1", "scan_1-2"];
+        let rows = names.map(|name| row(name, "floppy", 0.1, 30.0));
+        let report = report(&rows, &ReportParams::default());
+        let mut stems: Vec<String> = report
+            .figures
+            .iter()
+            .map(|figure| figure.stem.to_lowercase())
+            .collect();
+        let all = stems.len();
+        stems.sort();
+        stems.dedup();
+        assert_eq!(stems.len(), all, "{stems:?}");
     }
 
     #[test]

@@ -3,11 +3,12 @@
 //! The limit is that of the body that the voxels make, the voxel staircase. Bone is smooth: the limit answers for the
 //! staircase only and states no error of the bone's modulus.
 //!
-//! Both models come nearer to the limit as lattice parameter or element shrink, but not alike. The error of a graded
-//! lattice in bending, smeared over a cell, falls with the square of LP, beside scatter of where cells fall. That of voxel
+//! Both models converge as lattice parameter or element size shrink, at different orders. The error of a connected
+//! lattice in bending, smeared over a cell, falls with the square of LP, plus scatter from the position of the cells. That of voxel
 //! FE falls with the power 1.3 (edges of voxels; 1.17 to 1.31 fitted on phantoms, `reports/speed-vs-error.md`), from above.
 
 use crate::result::row::{Marks, Row, Solution};
+use crate::result::shape;
 use crate::result::settings::{BoundaryRule, Elements, Load, Method, Settings};
 
 /// Order in LP of a graded lattice's error.
@@ -132,6 +133,11 @@ fn limit(series: &[&Row]) -> Option<Row> {
             e_app_mpa: Some(e_mpa),
             algebraic_error_mpa: Some(algebraic),
             discretization_error_mpa: Some(error_mpa),
+            // The voxel staircase is another body than the bone: what lies between them is not stated.
+            shape_error_mpa: match is_voxel_fe(finest) {
+                true => None,
+                false => shape::of_lattice(finest).map(|s| s * e_mpa),
+            },
             wall_s: series.iter().map(|r| r.wall_s()).sum(),
             ..Solution::default()
         }),

@@ -2,6 +2,7 @@
 //! and the floppy modulus. Its stated error is half their gap, which is a bracket, not a likely error.
 
 use crate::result::row::{Marks, Row, Solution};
+use crate::result::shape;
 use crate::result::settings::{BoundaryRule, Settings};
 
 /// The rows of `rows` with one FFB row after each pair of firm and floppy that differ in nothing else. FFB rows already
@@ -37,7 +38,13 @@ fn mean_row(a: &Row, b: &Row) -> Row {
             boundary: Some(BoundaryRule::Ffb),
             ..a.key.clone()
         },
-        solved: solved.map(|(a, b)| mean(a, b)),
+        solved: solved.map(|(s, t)| {
+            let mean = mean(s, t);
+            Solution {
+                shape_error_mpa: mean.e_app_mpa.zip(shape::of_lattice(a)).map(|(e, s)| s * e),
+                ..mean
+            }
+        }),
         marks: Marks {
             note: unconverged(a, b),
             ..a.marks.clone()

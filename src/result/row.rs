@@ -35,7 +35,9 @@ pub struct Solution {
     pub shape_error_mpa: Option<f64>,
     /// Relative change of E_app per relative change of bone volume, all of the surface moved by one length.
     pub threshold_sensitivity: Option<f64>,
+    /// Wall time of the solve; longer where scans share the cores (`run --jobs`).
     pub wall_s: Option<f64>,
+    /// Largest resident memory of the process during the solve. None where several scans share the process.
     pub peak_mib: Option<f64>,
     /// Motions that cost next to no energy, rigid motions of the whole apart; where `--mechanisms` asks for them.
     pub mechanisms: Option<u64>,
@@ -51,7 +53,7 @@ pub struct FailureLoad {
     pub factor: f64,
 }
 
-/// What is known of a row or of its specimen beside the solve.
+/// What is known of a row or of its specimen apart from the solve.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Marks {
     /// What a reader must know of this row (no path between the faces, not converged, ...).

@@ -14,11 +14,11 @@ pub enum Method {
 }
 
 impl Method {
+    /// The words of settings and results, in the order of the variants.
+    pub const WORDS: &[&str] = &["lattice", "voxel-fe"];
+
     pub fn name(self) -> &'static str {
-        match self {
-            Method::Lattice => "lattice",
-            Method::VoxelFe => "voxel-fe",
-        }
+        Method::WORDS[self as usize]
     }
 }
 
@@ -121,7 +121,10 @@ impl Default for CellType {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "&'static str")]
 pub enum BoundaryRule {
-    Sites(Boundary),
+    Firm,
+    Floppy,
+    /// Sites that go with the bone in a cell: connected SC lattices, weighted BCC and FCC lattices.
+    Graded,
     /// Mean of firm and floppy.
     Ffb,
     /// Limit of several resolutions, of lattices or of elements.
@@ -129,21 +132,42 @@ pub enum BoundaryRule {
 }
 
 impl BoundaryRule {
-    pub const FIRM: BoundaryRule = BoundaryRule::Sites(Boundary::Firm);
-    pub const FLOPPY: BoundaryRule = BoundaryRule::Sites(Boundary::Floppy);
-    pub const GRADED: BoundaryRule = BoundaryRule::Sites(Boundary::Graded);
+    pub const FIRM: BoundaryRule = BoundaryRule::Firm;
+    pub const FLOPPY: BoundaryRule = BoundaryRule::Floppy;
+    pub const GRADED: BoundaryRule = BoundaryRule::Graded;
 
     pub fn name(self) -> &'static str {
         match self {
-            BoundaryRule::Sites(boundary) => boundary.name(),
+            BoundaryRule::Firm => "firm",
+            BoundaryRule::Floppy => "floppy",
+            BoundaryRule::Graded => "graded",
             BoundaryRule::Ffb => "ffb",
             BoundaryRule::Extrapolated => "extrapolated",
+        }
+    }
+
+    /// The method's own name: files say `graded` of two of them.
+    pub fn method_name(self, structure: CellType) -> &'static str {
+        match (self, structure) {
+            (BoundaryRule::Graded, CellType::Lattice(Structure::Sc)) => Boundary::Connected.name(),
+            (BoundaryRule::Graded, _) => Boundary::Weighted.name(),
+            _ => self.name(),
         }
     }
 
     /// True for a value that follows from other rows, without a solve of its own.
     pub fn is_derived(self) -> bool {
         matches!(self, BoundaryRule::Ffb | BoundaryRule::Extrapolated)
+    }
+}
+
+impl From<Boundary> for BoundaryRule {
+    fn from(boundary: Boundary) -> Self {
+        match boundary {
+            Boundary::Firm => BoundaryRule::Firm,
+            Boundary::Floppy => BoundaryRule::Floppy,
+            Boundary::Connected | Boundary::Weighted => BoundaryRule::Graded,
+        }
     }
 }
 

@@ -100,6 +100,13 @@ pub fn of_one_solve(image: Image, elements: Elements, size: f64, surface: f64) -
     })
 }
 
+/// The shape error of a lattice's modulus, relative: that of a mask. None where the thickness of struts is not known.
+pub fn of_lattice(row: &Row) -> Option<f64> {
+    let voxel_mm = row.key.voxel_mm.iter().product::<f64>().cbrt();
+    let thickness = row.marks.mean_thickness_mm? / voxel_mm;
+    Some(0.13 * surface(None, thickness))
+}
+
 /// Puts the stated parts into a row, as shares of its modulus.
 pub fn state(row: &mut Row, stated: Option<Stated>) {
     if let Some(solved) = &mut row.solved

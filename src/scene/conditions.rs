@@ -234,7 +234,7 @@ pub struct Time {
     pub step: f64,
     /// Let steps grow: each is a whole number of `step`s, such that the error an implicit Euler step adds to the
     /// relative densities (root mean square) stays near this. Steps still end on all times of outputs and of corners in
-    /// holds and loads, and start anew after the latter. Absent: all steps are `step`.
+    /// holds and loads, and start small again after the latter. Absent: all steps are `step`.
     #[serde(default)]
     pub tolerance: Option<f64>,
     /// A step that fails is halved down to this share of `step`, and grown back after four that succeed.

@@ -1,9 +1,9 @@
-//! Owns what a running scene tells the outside: states as they are accepted, and a closing summary.
+//! Owns what a running scene reports: states as they are accepted, and a closing summary.
 
 use crate::discretisation::plane::Points;
 use crate::error::{Error, Result};
-use crate::scene::pace::Pace;
 use crate::scene::state::State;
+use crate::scene::step_statistics::StepStatistics;
 use serde::{Deserialize, Serialize};
 
 /// What a scene writes, and when.
@@ -101,7 +101,7 @@ pub trait Observer {
     /// Before the first state. `steps` is the number of steps foreseen.
     fn start(&mut self, points: &Points, steps: usize) -> Result<()>;
     fn frame(&mut self, frame: &Frame) -> Result<()>;
-    /// A frame that was told of before, of the same time, now with its fields.
+    /// A frame that was reported before, of the same time, now with its fields.
     fn again(&mut self, frame: &Frame) -> Result<()> {
         self.frame(frame)
     }
@@ -133,7 +133,8 @@ pub struct Summary {
     pub converged: bool,
     /// How the time step changed, where time is marched through.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub pace: Option<Pace>,
+    #[serde(rename = "pace")]
+    pub step_statistics: Option<StepStatistics>,
     /// Further numbers by name.
     pub numbers: Vec<(String, f64)>,
     /// Why it stopped early, where it did.

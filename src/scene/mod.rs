@@ -4,14 +4,14 @@
 pub mod conditions;
 pub mod continuum_molecular;
 pub mod frame;
-pub mod pace;
 pub mod remodelling;
 pub mod setting;
 pub mod state;
+pub mod step_statistics;
 
 use crate::discretisation::plane::Points;
 use crate::discretisation::plane::geometry::Geometry;
-use crate::error::{Error, Result};
+use crate::error::{ADVICE, Error, Result};
 use conditions::{Hold, Layers, Load, Time};
 use continuum_molecular::Molecular;
 use frame::{Observer, Output, Summary};
@@ -106,11 +106,21 @@ impl Scene {
     /// `path` only words the errors.
     pub fn parse(text: &str, path: &Path) -> Result<Scene> {
         toml::from_str(text).map_err(|e| {
+            let found = format!("not a valid scene\n{e}");
+            // What a table may hold is refused in words that say what to do.
+            let advised = e.message().split_once(ADVICE);
+            if let Some((_, advice)) = advised {
+                return Error::file(
+                    path,
+                    found.replace(&format!("{ADVICE}{advice}"), ""),
+                    advice,
+                );
+            }
             let advice = match nearest_key(e.message()) {
                 Some(key) => format!("did you mean `{key}`?"),
                 None => "correct the line shown; `pipelines/` has example scenes".to_owned(),
             };
-            Error::file(path, format!("not a valid scene\n{e}"), advice)
+            Error::file(path, found, advice)
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Owns a scene's state between two steps as plain named numbers: what a scene that was stopped goes on from.
+//! Owns a scene's state between two steps as plain named numbers: what a stopped scene resumes from.
 
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ impl State {
         found.ok_or_else(|| {
             Error::specimen(
                 format!("the kept state of this scene has no {len} numbers \"{name}\""),
-                "start anew with --force",
+                "start from the beginning with --force",
             )
         })
     }

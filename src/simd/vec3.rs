@@ -7,7 +7,7 @@ use std::ops::{Add, Mul, Sub};
 /// Methods may be called only where the implementation's instruction set is available; pointers must be valid for three
 /// scalars. The fourth lane is zero after `load`, and stays what arithmetic makes of zeros.
 #[allow(clippy::missing_safety_doc)] // one contract for all methods, above
-pub trait Quad: Copy {
+pub trait Vec3Lanes: Copy {
     type S: Copy;
     unsafe fn zero() -> Self;
     unsafe fn splat(s: Self::S) -> Self;
@@ -40,8 +40,8 @@ pub trait Precision:
     + Mul<Output = Self>
 {
     /// With AVX2, where that can be had.
-    type Fast: Quad<S = Self>;
-    type Plain: Quad<S = Self>;
+    type Fast: Vec3Lanes<S = Self>;
+    type Plain: Vec3Lanes<S = Self>;
 }
 
 impl Precision for f64 {
@@ -65,7 +65,7 @@ macro_rules! plain {
         #[derive(Clone, Copy)]
         pub struct $name([$s; 3]);
 
-        impl Quad for $name {
+        impl Vec3Lanes for $name {
             type S = $s;
             #[inline(always)]
             unsafe fn zero() -> Self {
@@ -125,7 +125,7 @@ use avx2::{Avx32, Avx64};
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    use super::Quad;
+    use super::Vec3Lanes;
     use std::arch::x86_64::*;
 
     macro_rules! avx2 {
@@ -134,7 +134,7 @@ mod avx2 {
             #[derive(Clone, Copy)]
             pub struct $name($reg);
 
-            impl Quad for $name {
+            impl Vec3Lanes for $name {
                 type S = $s;
                 #[inline(always)]
                 unsafe fn zero() -> Self {

@@ -6,8 +6,11 @@ use bonepd_ct::command::segment::in_memory;
 use bonepd_ct::discretisation::voxels::Planes;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::operator::held::Constrained;
-use bonepd_ct::pipeline::apparent::bricks::{Bricks, Keep};
-use bonepd_ct::pipeline::apparent::voxel_fe::{solve_voxels, supports};
+use bonepd_ct::pipeline::apparent::discretisation::Prepared;
+use bonepd_ct::pipeline::apparent::solve_voxels;
+use bonepd_ct::pipeline::apparent::tissue::Tissue;
+use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
+use bonepd_ct::pipeline::apparent::voxel_fe::supports;
 use bonepd_ct::pipeline::apparent::{Ends, SolveParams};
 use bonepd_ct::pipeline::phantom::{PhantomParams, scan, structure};
 use bonepd_ct::pipeline::segment::{SegmentParams, segment};
@@ -31,12 +34,10 @@ fn main() {
             report(&name, &thin(seed), Ends::Bonded);
         }
     }
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let stack = root.join("../shared/data/lhdl_3155_D_4_bc");
     if wanted("stack") {
-        match stack.exists() {
-            true => report("stack", &real(&stack), Ends::Free),
-            false => println!("stack: skipped: {} is not there", stack.display()),
+        match std::env::var_os("BONEPD_STACK") {
+            Some(stack) => report("stack", &real(Path::new(&stack)), Ends::Free),
+            None => println!("stack: skipped: BONEPD_STACK does not name the folder of its slices"),
         }
     }
 }
@@ -112,11 +113,14 @@ fn report(name: &str, specimen: &Specimen, ends: Ends) {
 
 /// Iterations of conjugate gradients with the diagonal until the residual is 1e-6 of the first, and the energy `uᵀAu`.
 fn plain(specimen: &Specimen, params: &SolveParams) -> (usize, f64) {
-    let model = Bricks::new(specimen, params, Keep::BetweenGrips).expect("bricks");
+    let tissue = &Tissue::of(specimen, params).expect("one solid");
+    let prepared = Prepared { specimen, tissue };
+    let model = Bricks::new(prepared, params, Keep::BetweenGrips).expect("bricks");
     let grid = model.mesh().grid;
     let grips = Planes::within(&grid, params.axis, 0.0).expect("room between the ends");
     let stretch_mm = params.strain * grid.size_mm()[params.axis.index()];
-    let (held, mut u) = supports(model.mesh(), grips, params, stretch_mm);
+    let held = supports::held(model.mesh(), grips, params);
+    let mut u = supports::bar(model.mesh(), grips, stretch_mm);
     let diagonal = Jacobi::new(&Constrained {
         inner: &model,
         held: &held,

@@ -15,7 +15,7 @@ use bonepd_ct::operator::{MixedPrecision, Operator, SinglePreconditioner};
 use bonepd_ct::physics::lattice::multigrid::Springs;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
 use bonepd_ct::pipeline::apparent::SolveParams;
-use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
+use bonepd_ct::pipeline::apparent::solve_lattice;
 use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure, build};
 use bonepd_ct::recipe::Recipe;
 use bonepd_ct::solver::amg::{Amg, AmgParams};
@@ -45,9 +45,9 @@ fn held(sites: &Sites) -> Held {
     held
 }
 
-fn model(sites: &Sites, poisson: f64) -> Lattice<'_> {
+fn model(sites: &Sites, poisson: f64) -> Lattice {
     Lattice::new(
-        sites,
+        sites.clone(),
         Moduli::new(Structure::Sc, LP_MM, 1000.0, poisson).expect("a solid"),
     )
 }

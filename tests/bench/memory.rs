@@ -5,11 +5,15 @@
 mod specimen;
 
 use bonepd_ct::pipeline::apparent::SolveParams;
-use bonepd_ct::pipeline::apparent::lattice::solve_lattice;
-use bonepd_ct::pipeline::apparent::memory;
+use bonepd_ct::pipeline::apparent::discretisation::{Known, Prepared};
+use bonepd_ct::pipeline::apparent::job::Job;
+use bonepd_ct::pipeline::apparent::solve_lattice;
+use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::solved::Solved;
-use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::tissue::Tissue;
+use bonepd_ct::pipeline::apparent::{of_lattice, of_voxels};
 use bonepd_ct::pipeline::lattice::{Boundary, Case, Structure};
+use bonepd_ct::volume::Specimen;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -87,11 +91,11 @@ fn main() {
             (Structure::Bcc, Boundary::Floppy),
             (Structure::Bcc, Boundary::Firm),
             (Structure::Fcc, Boundary::Floppy),
-            (Structure::Sc, Boundary::Graded),
+            (Structure::Sc, Boundary::Connected),
         ] {
             let lp_mm = match (structure, boundary) {
                 (Structure::Bcc, _) => 0.02 * 2f64.cbrt(),
-                (_, Boundary::Firm | Boundary::Graded) => 0.03,
+                (_, Boundary::Firm | Boundary::Connected) => 0.03,
                 _ => 0.02,
             };
             let case = Case {
@@ -103,13 +107,20 @@ fn main() {
             report(
                 &format!("lattice {} {}", structure.name(), boundary.name()),
                 &|| solve_lattice(&bone, &case, &params, |_| ()).expect("a lattice that fits"),
-                &|| memory::of_lattice(&bone, &case, &params).expect("a lattice that fits"),
+                &|| predicted(&of_lattice(case), &bone, &params),
             );
         }
         report(
             "voxel-fe",
             &|| solve_voxels(&bone, &params, |_| ()).expect("a mesh that fits"),
-            &|| memory::of_voxel_fe(&bone, &params),
+            &|| predicted(&of_voxels(), &bone, &params),
         );
     }
+}
+
+fn predicted(job: &Job, specimen: &Specimen, params: &SolveParams) -> f64 {
+    let tissue = &Tissue::of(specimen, params).expect("one solid");
+    let known = Known::Bone(Prepared { specimen, tissue });
+    let cost = job.cost(params, known).expect("a model that fits");
+    cost.bytes[1]
 }

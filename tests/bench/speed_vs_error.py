@@ -2,18 +2,18 @@
 """Speed against error: phantoms and a real stack by every method, against voxel FE refined and extrapolated.
 
     python3 tests/bench/speed_vs_error.py target/release/bonepd-ct        # figures, tables, reports/speed-vs-error.csv
-    ... --references          # make reports/references.csv anew first (an hour, 7 GiB)
+    ... --references          # compute reports/references.csv again first (an hour, 7 GiB)
     ... --draw                # only figures and tables, from the CSV files that are there
 
-Needs matplotlib (PyPI). The stack is read from ../shared/data where that is there, and skipped otherwise.
+Needs matplotlib (PyPI). The stack is read from the folder that BONEPD_STACK names, and skipped where that is not there.
 """
 
-import argparse, collections, csv, math, pathlib, re, subprocess, sys
+import argparse, collections, csv, math, os, pathlib, re, subprocess, sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 REPORTS = ROOT / "reports"
 OUT = REPORTS / "speed-vs-error"
-STACK = ROOT.parent / "shared" / "data" / "lhdl_3155_D_4_bc"
+STACK = pathlib.Path(os.environ.get("BONEPD_STACK", ROOT.parent / "shared/data/lhdl_3155_D_4_bc"))
 # Strut thickness in mm; BV/TV; seed. 2 mm cubes of 0.02 mm voxels. Seed 1 was looked at while the method was made,
 # seed 2 only afterwards.
 PHANTOMS = [(t, b, s) for t in (0.1, 0.2) for b in (0.1, 0.2, 0.3, 0.4) for s in (1, 2)]

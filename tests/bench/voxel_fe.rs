@@ -14,7 +14,7 @@ use bonepd_ct::par::CHUNK;
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::Integration;
 use bonepd_ct::pipeline::apparent::SolveParams;
-use bonepd_ct::pipeline::apparent::voxel_fe::solve_voxels;
+use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::solver::amg::{Amg, AmgParams};
 use bonepd_ct::volume::Specimen;
 use criterion::{Criterion, Throughput};

@@ -1,12 +1,14 @@
 //! Sound files to damage: every format in every way of storing it that has code of its own.
 
 use crate::formats::{dicom, sound_files, volume};
+use crate::inputs::write::{self, Order, Packing, Page, Value};
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use std::io::{Cursor, Write};
 use tiff::encoder::{Compression as TiffCompression, TiffEncoder, colortype};
 
 /// A file, and what lies beside it undamaged.
+#[derive(Clone)]
 pub struct Sample {
     /// Relative to a folder of its own.
     pub name: &'static str,
@@ -17,7 +19,7 @@ pub struct Sample {
 impl Sample {
     /// Settings and results, not voxels.
     pub fn is_table(&self) -> bool {
-        self.name.ends_with(".csv") || self.name.ends_with(".toml")
+        self.name.ends_with(".csv") || self.name.ends_with(".tsv") || self.name.ends_with(".toml")
     }
 }
 
@@ -40,8 +42,34 @@ pub fn samples() -> Vec<Sample> {
     all.extend(pictures());
     all.extend(scanco());
     all.push(alone("implicit.dcm", dicom(&le_bytes()[..40], true)));
+    all.extend(super::headers::samples());
     all.extend(tables());
+    all.extend(arrays());
     all
+}
+
+/// Halves with axes of one, and an archive of them.
+fn arrays() -> [Sample; 2] {
+    let mut text = "{'descr': '<f2', 'fortran_order': True, 'shape': (1, 3, 4, 5, 1), }".to_owned();
+    text += &" ".repeat(117 - text.len());
+    text.push('\n');
+    let halves: Vec<u8> = (0..60u16)
+        .flat_map(|v| (0x3C00 + 40 * v).to_le_bytes())
+        .collect();
+    let npy = [
+        b"\x93NUMPY\x02\x00",
+        &118u32.to_le_bytes()[..],
+        text.as_bytes(),
+        &halves,
+    ]
+    .concat();
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    archive
+        .start_file("scan.npy", zip::write::SimpleFileOptions::default())
+        .unwrap();
+    archive.write_all(&npy).unwrap();
+    let archive = archive.finish().unwrap().into_inner();
+    [alone("half.npy", npy), alone("a.npz", archive)]
 }
 
 fn le_bytes() -> Vec<u8> {
@@ -164,12 +192,66 @@ fn tiffs() -> Vec<Sample> {
         alone("imagej.tif", imagej()),
         alone("bits.tif", crate::stored::bits(1)),
         alone("ome.tif", ome()),
+        alone("zstd.tif", stored(Packing::Zstandard, 16)),
+        alone("12-bit.tif", stored(Packing::Deflate, 12)),
+        alone("tiles.tif", tiles()),
+        alone("palette.tif", palette()),
         Sample {
             name: "tiffs/s2.tif",
             bytes: small_page(),
             beside: vec![("tiffs/s10.tif", small_page())],
         },
     ]
+}
+
+/// Three pages of values that begin at 0.
+fn pages(packing: Packing, bits: usize) -> Vec<Page> {
+    let values = volume();
+    let values = values.as_slice().chunks(20);
+    values
+        .map(|page| Page {
+            packing,
+            bits,
+            reversed_bits: bits == 12,
+            rows_per_strip: 2,
+            ..Page::grey(5, 4, page.iter().map(|v| (v + 900) as u64).collect())
+        })
+        .collect()
+}
+
+fn stored(packing: Packing, bits: usize) -> Vec<u8> {
+    write::tiff(&pages(packing, bits), Order::default())
+}
+
+/// Big-endian BigTIFF of tiles with differences, each slice named by OME-XML.
+fn tiles() -> Vec<u8> {
+    let text = "<OME><Image><Pixels SizeX=\"5\" SizeY=\"4\" SizeZ=\"3\" SizeC=\"1\" SizeT=\"1\" PhysicalSizeX=\"20\" PhysicalSizeY=\"20\"><TiffData IFD=\"0\" FirstZ=\"2\"/><TiffData IFD=\"1\" FirstZ=\"1\"/><TiffData IFD=\"2\"/></Pixels></Image></OME>";
+    let mut pages = pages(Packing::Lzw, 16);
+    for page in &mut pages {
+        (page.tile, page.predictor) = (Some([16, 16]), 2);
+    }
+    pages[0] = pages[0].clone().with(270, Value::Ascii(text.into()));
+    let order = Order {
+        big_endian: true,
+        big_tiff: true,
+    };
+    write::tiff(&pages, order)
+}
+
+/// Labels of 8 bits with a table of colours from ImageJ.
+fn palette() -> Vec<u8> {
+    let table = (0..768u16).map(|i| i % 7 * 9000).collect();
+    let page = Page {
+        bits: 8,
+        photometric: 3,
+        packing: Packing::PackBits,
+        ..Page::grey(5, 4, (0..20).collect())
+    };
+    let text = Value::Ascii(b"ImageJ=1.54f\nunit=um\nspacing=20\n".to_vec());
+    write::tiff(
+        &[page.with(320, Value::Short(table)).with(270, text)],
+        Order::default(),
+    )
 }
 
 fn ome() -> Vec<u8> {
@@ -243,7 +325,10 @@ fn pictures() -> Vec<Sample> {
             name: "bmps/s1.bmp",
             beside: vec![
                 ("bmps/s2.bmp", bmp.clone()),
-                ("bmps/s.log", b"Pixel Size (um)=17.4\n".to_vec()),
+                (
+                    "bmps/s.log",
+                    b"Pixel Size (um)=17.4\nSection to Section Step=2\n".to_vec(),
+                ),
             ],
             bytes: bmp,
         },
@@ -304,6 +389,10 @@ fn tables() -> Vec<Sample> {
     let recipe = include_str!("../../pipelines/paper.toml");
     vec![
         alone("manifest.csv", manifest.into()),
+        alone(
+            "manifest.tsv",
+            "path\tspacing_mm\tlower\na.nii\t0,02 x 0,02 x 0,04\t12,5\n".into(),
+        ),
         alone("results.csv", results.into_bytes()),
         alone("recipe.toml", recipe.into()),
     ]

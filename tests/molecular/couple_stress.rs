@@ -72,7 +72,7 @@ fn errors(layer: f64, calibrated: bool) -> [f64; 2] {
         panic!("a continuum-molecular scene")
     };
     let setup = Setup::new(&scene.setting, model, &Inputs::default()).unwrap();
-    let elasticity = model.elasticity.as_ref().unwrap();
+    let elasticity = model.problem.elasticity().unwrap();
     let mut solid = Solid::<3>::new(&scene.setting, model, elasticity, &tensor, &setup).unwrap();
     let positions = setup.points.positions();
     let free = |p: &[f64; 2]| p[0].abs() < wide && p[1].abs() < half;

@@ -6,6 +6,7 @@ Each model is solved here and there; E_app from CalculiX's reaction force must a
 """
 
 import json
+import os
 import pathlib
 import random
 import re
@@ -82,7 +83,7 @@ MIXED = [
     ["--material", "linear:300,500", "--axis", "y", "--ends", "bonded"],
     ["--coarsen", "2", "--bins", "1000"],
 ]
-STACK = ROOT.parent / "shared/data/lhdl_3155_D_4_bc"
+STACK = pathlib.Path(os.environ.get("BONEPD_STACK", ROOT.parent / "shared/data/lhdl_3155_D_4_bc"))
 CROP = ["--spacing", "0.0195", "--gaussian", "1", "--lower", "63", "--crop", "60:96,60:96,80:116"]
 
 

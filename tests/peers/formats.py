@@ -1,6 +1,6 @@
 """Files written by independent software, read by bonepd-ct: geometry, orientation, units, and a block of bone voxel by voxel of its mask.
 
-    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom tifffile imagecodecs Pillow aimio-py numpy
+    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom pynrrd tifffile imagecodecs Pillow aimio-py numpy
     /tmp/peers/bin/python tests/peers/formats.py target/release/bonepd-ct
 
 A writer that is not installed is skipped with its reason. Exit code 1 if anything differs.
@@ -32,9 +32,10 @@ def ask(*words):
     return json.loads(done.stdout)
 
 
-def check(name, path, world, spacing=SPACING, unit=None, extra=(), grey=None):
+def check(name, path, world, spacing=SPACING, unit=None, extra=(), grey=None, own=None):
     """`world`: the expected mask of the block, canonical axes (z up, y front, x right), from our own mask file; `grey`: all
-    values, whose least, greatest and mean must be told."""
+    values, whose least, greatest and mean must be told; `own`: the mask as stored in the scan (x, y, z) and its affine, which
+    our mask file must have, too."""
     import nibabel
 
     try:
@@ -52,13 +53,42 @@ def check(name, path, world, spacing=SPACING, unit=None, extra=(), grey=None):
             lower = () if "--lower" in extra else ("--lower", 2999.5)
             ask("segment", path, "-o", out, *lower, "--keep-all", *extra)
             mask = nibabel.load(pathlib.Path(out) / "mask.nii.gz")
-            found = np.asarray(mask.dataobj).T
+            stored = np.asarray(mask.dataobj)
+            found = np.asarray(nibabel.as_closest_canonical(mask).dataobj).T
+        if own is not None:
+            assert (stored == own[0]).all(), "the mask is not in the order of the scan"
+            assert np.allclose(mask.affine, own[1], atol=1e-5), (mask.affine, own[1])
         assert found.shape == world.shape, (found.shape, world.shape)
         assert (found != world).sum() == 0, f"{(found != world).sum()} voxels differ"
         print(f"ok       {name}")
     except Exception as e:
         FAILED.append(name)
         print(f"FAILED   {name}: {e}")
+
+
+def refuse(name, path, *words):
+    """Our refusal of what has no right value, in words that name it."""
+    try:
+        ask("info", path)
+        said = "it was read"
+    except RuntimeError as e:
+        said = str(e)
+    good = all(word in said for word in words)
+    print(f"{'ok      ' if good else 'FAILED  '} {name}: refused{'' if good else ' in other words: ' + said}")
+    FAILED.extend([] if good else [name])
+
+
+def refused(name, path, said, write):
+    """A file that is no one scan, refused in words that say why."""
+    write(path)
+    try:
+        ask("info", path)
+        words = "it was read"
+    except RuntimeError as e:
+        words = str(e)
+    same = said in words
+    print(f"{'ok      ' if same else 'FAILED  '} {name}: refused" + ("" if same else f": {words}"))
+    FAILED.extend([] if same else [name])
 
 
 def needs(module):
@@ -106,8 +136,35 @@ def nibabel_files(dir):
         turn = nib.orientations.ornt_transform(
             nib.orientations.axcodes2ornt("RAS"), nib.orientations.axcodes2ornt(tuple(codes))
         )
-        nib.save(image.as_reoriented(turn), dir / f"{codes}.nii.gz")
-        check(f"nibabel stored as {codes}", dir / f"{codes}.nii.gz", expected)
+        turned = image.as_reoriented(turn)
+        nib.save(turned, dir / f"{codes}.nii.gz")
+        own = (np.asarray(turned.dataobj) > 2999.5, turned.affine)
+        check(f"nibabel stored as {codes}", dir / f"{codes}.nii.gz", expected, own=own)
+    for endian in "<>":
+        two = nib.Nifti2Image(data, np.diag([*SPACING, 1.0]), header=nib.Nifti2Header(endianness=endian))
+        two.header.set_xyzt_units("mm")
+        path = dir / f"two{ord(endian)}.nii.gz"
+        nib.save(two, path)
+        check(f"nibabel NIfTI-2 {'little' if endian == '<' else 'big'}-endian", path, expected, own=(data > 2999.5, two.affine))
+    two = nib.Nifti2Pair(data, np.diag([*SPACING, 1.0]))
+    two.header.set_xyzt_units("mm")
+    nib.save(two, dir / "a.b.img")
+    check("nibabel NIfTI-2 pair, given by its image", dir / "a.b.img", expected)
+    # Analyze: its axes are as stored here, which the note says; nibabel mirrors x.
+    for kind in (nib.AnalyzeImage, nib.Spm99AnalyzeImage):
+        old = kind(data, np.diag([*SPACING, 1.0]))
+        path = dir / f"{kind.__name__}.img"
+        nib.save(old, path)
+        assert (np.asarray(nib.load(path).dataobj) == data).all()
+        check(f"nibabel {kind.__name__}", path, expected, grey=GREY)
+    damaged = bytearray((dir / "LPS.nii.gz").read_bytes())
+    damaged[-6] ^= 1
+    (dir / "crc.nii.gz").write_bytes(damaged)
+    refuse("gzip with a wrong checksum", dir / "crc.nii.gz", "checksum")
+    sheared = np.diag([*SPACING, 1.0])
+    sheared[0, 2] = 0.01
+    nib.save(nib.Nifti1Image(data, sheared), dir / "sheared.nii")
+    refuse("nibabel sheared", dir / "sheared.nii", "sheared", "11.31")
 
 
 def simpleitk_files(dir):
@@ -125,7 +182,79 @@ def simpleitk_files(dir):
     for name in ("turned.mha", "turned.nrrd", "turned.nii.gz"):
         sitk.WriteImage(image, str(dir / name))
         ras = sitk.DICOMOrient(image, "RAS")
-        check(f"SimpleITK {name}", dir / name, (sitk.GetArrayFromImage(ras) > 2999.5).astype(np.uint8), ras.GetSpacing())
+        own = (GREY.T > 2999.5, itk_affine(image))
+        check(f"SimpleITK {name}", dir / name, (sitk.GetArrayFromImage(ras) > 2999.5).astype(np.uint8), ras.GetSpacing(), own=own)
+    image.SetDirection((1, 0, 0, 0, 1, 0, 0, 0, 1))
+    image.SetOrigin((1.5, -2.5, 7.0))
+    thin = sitk.JoinSeries([image])
+    sitk.WriteImage(thin, str(dir / "four.mha"))
+    check("SimpleITK four dimensions", dir / "four.mha", world, own=(GREY.T > 2999.5, itk_affine(image)))
+    # MetaImages that SimpleITK reads and does not write: slices in files of their own, skips, text, scales of its own.
+    for k, page in enumerate(GREY):
+        (dir / f"s{k:03d}.raw").write_bytes(b"sixteen bytes!!!" + page.tobytes())
+    head = f"ObjectType = Image\nNDims = 3\nDimSize = 7 8 9\nElementSpacing = {SPACING[0]} {SPACING[1]} {SPACING[2]}\nElementType = MET_SHORT\n"
+    names = "\n".join(f"s{k:03d}.raw" for k in range(9))
+    for name, rest in {
+        "list": f"HeaderSize = 16\nElementDataFile = LIST\n{names}\n",
+        "list2d": f"HeaderSize = -1\nElementDataFile = LIST 2D\n{names}\n",
+        "pattern": "HeaderSize = 16\nElementDataFile = s%03d.raw 0 8 1\n",
+        "text": "BinaryData = False\nElementDataFile = LOCAL\n" + " ".join(map(str, GREY.ravel())) + "\n",
+    }.items():
+        path = dir / f"{name}.mhd"
+        path.write_text(head + rest)
+        theirs = sitk.GetArrayFromImage(sitk.ReadImage(str(path)))
+        assert (theirs == GREY).all(), f"SimpleITK reads {name} differently"
+        check(f"MetaImage {name}, as SimpleITK reads it", path, world, grey=GREY)
+
+
+def itk_affine(image):
+    """Of voxel indices to RAS."""
+    affine = np.eye(4)
+    affine[:3, :3] = np.reshape(image.GetDirection(), (3, 3)) * image.GetSpacing()
+    affine[:3, 3] = image.GetOrigin()
+    return np.diag([-1, -1, 1, 1]) @ affine
+
+
+def pynrrd_files(dir):
+    nrrd = needs("nrrd")
+    if not nrrd:
+        return
+    world = (GREY > 2999.5).astype(np.uint8)
+    for encoding in ("raw", "gzip", "bzip2", "ascii"):
+        for name in ("a.nrrd", "a.nhdr"):
+            path = dir / f"{encoding}-{name}"
+            header = {"encoding": encoding, "spacings": SPACING, "units": ["mm"] * 3, "endian": "little"}
+            nrrd.write(str(path), GREY.T, header)
+            check(f"pynrrd {encoding} {name[2:]}", path, world, grey=GREY)
+    directions = np.array([[0, 20, 0], [0, 0, -30], [50, 0, 0]])
+    header = {"space": "left-anterior-superior", "space directions": directions, "space origin": [1, 2, 3], "space units": ["um"] * 3}
+    path = dir / "turned.nrrd"
+    nrrd.write(str(path), GREY.T, header)
+    affine = np.eye(4)
+    affine[:3, :3], affine[:3, 3] = directions.T / 1000, [0.001, 0.002, 0.003]
+    affine = np.diag([-1, 1, 1, 1]) @ affine
+    turned = GREY.transpose(1, 2, 0)[::-1, :, ::-1] > 2999.5
+    check("pynrrd micrometres, turned", path, turned.astype(np.uint8), (0.05, 0.02, 0.03), own=(GREY.T > 2999.5, affine))
+    sitk = needs("SimpleITK")
+    if not sitk:
+        return
+    # What SimpleITK reads and neither writes: skips and slices in files of their own.
+    head = "NRRD0005\ntype: short\ndimension: 3\nsizes: 7 8 9\nspacings: 0.02 0.03 0.05\nendian: little\n"
+    (dir / "lines.raw").write_bytes(b"one\ntwo\n123" + GREY.tobytes())
+    for k, page in enumerate(GREY):
+        (dir / f"n{k}.raw").write_bytes(page.tobytes())
+    names = "\n".join(f"n{k}.raw" for k in range(9))
+    for name, rest in {
+        "skips": "encoding: raw\nlineskip: 2\nbyteskip: 3\ndata file: lines.raw\n",
+        "end": "encoding: raw\nbyte skip: -1\ndata file: lines.raw\n",
+        "list": f"encoding: raw\ndata file: LIST\n{names}\n",
+        "pattern": "encoding: raw\ndatafile: n%d.raw 0 8 1\n",
+    }.items():
+        path = dir / f"{name}.nhdr"
+        path.write_text(head + rest)
+        theirs = sitk.GetArrayFromImage(sitk.ReadImage(str(path)))
+        assert (theirs == GREY).all(), f"SimpleITK reads {name} differently"
+        check(f"NRRD {name}, as SimpleITK reads it", path, world, grey=GREY)
 
 
 def pydicom_files(dir):
@@ -162,6 +291,108 @@ def pydicom_files(dir):
         world = (GREY * 2.0 - 1000 > 2999.5).astype(np.uint8)[:, ::-1, ::-1]
         check(f"pydicom series, {name}", folder, world, unit="HU")
         assert "Jane" not in json.dumps(ask("info", folder)), "a patient's name got out"
+    pydicom_kinds(dir, pydicom)
+
+
+def pydicom_kinds(dir, pydicom):
+    """The last series above in other codings, each file changed by pydicom and read back by it."""
+    from pydicom.uid import DeflatedExplicitVRLittleEndian, RLELossless
+
+    source = sorted((dir / "dicom_explicit").iterdir())
+    world = (GREY * 2.0 - 1000 > 2999.5).astype(np.uint8)[:, ::-1, ::-1]
+    first = pydicom.dcmread(source[0])
+    origin = np.diag([-SPACING[0], -SPACING[1], SPACING[2], 1.0])
+    origin[:3, 3] = [-1.0, -2.0, 0.0]
+    own = ((GREY * 2.0 - 1000 > 2999.5).T, origin)
+
+    def series(name, change, save=None, unit="HU"):
+        folder = dir / name
+        folder.mkdir()
+        for path in source:
+            ds = pydicom.dcmread(path)
+            change(ds)
+            if save:
+                save(ds, folder / path.name)
+            else:
+                ds.save_as(folder / path.name, enforce_file_format=True)
+            back = pydicom.dcmread(folder / path.name, force=True)
+            if hasattr(back.file_meta, "TransferSyntaxUID"):
+                assert (back.pixel_array == pydicom.dcmread(path).pixel_array).all(), name
+        check(f"pydicom {name}", folder, world, unit=unit, own=own)
+
+    def syntax(uid):
+        def change(ds):
+            ds.file_meta.TransferSyntaxUID = uid
+        return change
+
+    def sequence(ds):
+        inner = pydicom.Dataset()
+        inner.ScheduledProcedureStepDescription = "made"
+        ds.RequestAttributesSequence = [inner]
+        ds["RequestAttributesSequence"].is_undefined_length = True
+
+    series("RLE", lambda ds: ds.compress(RLELossless))
+    series("deflated", syntax(DeflatedExplicitVRLittleEndian))
+    series("sequence of undefined length", sequence)
+    bare = lambda ds, path: pydicom.dcmwrite(path, pydicom.Dataset({e.tag: e for e in ds}), implicit_vr=True, little_endian=True)
+    series("without preamble and meta information", lambda ds: None, save=bare)
+    series("MONOCHROME1", lambda ds: setattr(ds, "PhotometricInterpretation", "MONOCHROME1"))
+
+    def density(ds):
+        ds.RescaleType = "mgHA/ccm"
+
+    series("rescaled to density", density, unit="mg HA/cm3")
+    enhanced(dir, pydicom, first, own, world)
+    tilted = dir / "tilted"
+    tilted.mkdir()
+    for path in source:
+        ds = pydicom.dcmread(path)
+        x, y, z = ds.ImagePositionPatient
+        ds.ImagePositionPatient = [x, y + 0.5 * z, z]
+        ds.save_as(tilted / path.name, enforce_file_format=True)
+    refuse("pydicom tilted gantry", tilted, "sheared", "26.57")
+    for uid, name in (("JPEGLSLossless", "JPEG-LS"), ("JPEG2000Lossless", "JPEG 2000")):
+        path = dir / f"{uid}.dcm"
+        ds = pydicom.dcmread(source[0])
+        try:
+            ds.compress(getattr(pydicom.uid, uid))
+        except Exception as e:
+            print(f"skipped  pydicom {name}: {e}")
+            continue
+        ds.save_as(path, enforce_file_format=True)
+        refuse(f"pydicom {name}", path, name, "gdcmconv --raw")
+
+
+def enhanced(dir, pydicom, first, own, world):
+    """All slices in one file, frames in another order than along the normal, place and scale in functional groups."""
+    from pydicom.dataset import Dataset
+    from pydicom.uid import EnhancedCTImageStorage
+
+    ds = first
+    order = list(rng.permutation(len(GREY)))
+    ds.SOPClassUID = ds.file_meta.MediaStorageSOPClassUID = EnhancedCTImageStorage
+    ds.NumberOfFrames = len(order)
+
+    def group(name, **values):
+        inner, outer = Dataset(), Dataset()
+        for key, value in values.items():
+            setattr(inner, key, value)
+        setattr(outer, name, [inner])
+        return outer
+
+    shared = group("PixelMeasuresSequence", PixelSpacing=[SPACING[1], SPACING[0]], SliceThickness=9.0)
+    shared.update(group("PlaneOrientationSequence", ImageOrientationPatient=[1, 0, 0, 0, 1, 0]))
+    shared.update(group("PixelValueTransformationSequence", RescaleSlope=2, RescaleIntercept=-1000, RescaleType="HU"))
+    ds.SharedFunctionalGroupsSequence = [shared]
+    ds.PerFrameFunctionalGroupsSequence = [
+        group("PlanePositionSequence", ImagePositionPatient=[1.0, 2.0, float(k) * SPACING[2]]) for k in order
+    ]
+    for key in ("PixelSpacing", "SliceThickness", "ImagePositionPatient", "ImageOrientationPatient", "RescaleSlope", "RescaleIntercept"):
+        delattr(ds, key)
+    ds.PixelData = GREY[order].tobytes()
+    path = dir / "enhanced"
+    ds.save_as(path, enforce_file_format=True)
+    check("pydicom enhanced, frames shuffled", path, world, unit="HU", own=own)
 
 
 def tifffile_files(dir):
@@ -202,15 +433,79 @@ def tifffile_files(dir):
         check(f"tifffile {np.dtype(kind).name}", path, (stored.astype(float) > lower).astype(np.uint8), None,
               extra=("--spacing", "0.02", "--lower", lower), grey=stored)
     bone = GREY > 2999.5
-    for name, photometric, stored in (("black is 0", "minisblack", bone), ("white is 0", "miniswhite", ~bone)):
-        path = dir / f"{photometric}-1-bit.tif"
-        tifffile.imwrite(path, stored, photometric=photometric)
-        check(f"tifffile 1 bit, {name}", path, world, None, extra=("--spacing", "0.02", "--lower", "0.5"), grey=bone)
+    # What shows 0 as white holds the values that tifffile reads back.
+    for photometric in ("minisblack", "miniswhite"):
+        for name, stored in (("1 bit", bone), ("8 bits", bone.astype(np.uint8) * 255), ("16 bits", grey), ("floats", GREY.astype(np.float32))):
+            path = dir / f"{photometric}-{name}.tif"
+            tifffile.imwrite(path, stored, photometric=photometric)
+            back = tifffile.imread(path)
+            lower = 0.5 if name == "1 bit" else 200 if name == "8 bits" else 2999.5
+            check(f"tifffile {name}, {photometric}", path, (back > lower).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", lower), grey=back)
+    path = dir / "shaped.tif"
+    tifffile.imwrite(path, GREY[None, :, None], photometric="minisblack")
+    check("tifffile shaped, axes of one", path, world, None, extra=("--spacing", "0.02"), grey=GREY)
+    refused("tifffile shaped, four axes", dir / "four.tif", "shape", lambda path: tifffile.imwrite(path, np.stack([GREY, GREY]), photometric="minisblack"))
+    for axes, shape, said in (("ZCYX", (2, 3), "2 channels"), ("TZYX", (2, 3), "times")):
+        many = np.broadcast_to(GREY[:3, None], (3, 2) + GREY.shape[1:]) if axes == "ZCYX" else np.broadcast_to(GREY[None, :3], (2, 3) + GREY.shape[1:])
+        refused(f"tifffile OME {axes}", dir / f"{axes}.ome.tif", said, lambda path: tifffile.imwrite(path, np.ascontiguousarray(many), metadata={"axes": axes}))
+    for axes in ("ZCYX", "TZYX"):
+        many = np.ascontiguousarray(np.broadcast_to(grey[:3, None] if axes == "ZCYX" else grey[None, :3], (3, 2) + grey.shape[1:] if axes == "ZCYX" else (2, 3) + grey.shape[1:]))
+        refused(f"tifffile ImageJ {axes}", dir / f"ij_{axes}.tif", "hyperstack", lambda path: tifffile.imwrite(path, many, imagej=True, metadata={"axes": axes}))
+    tifffile.imwrite(dir / "ij_t.tif", grey, imagej=True, resolution=px, metadata={"spacing": 0.05, "unit": "mm", "axes": "TYX"})
+    check("tifffile ImageJ, slices as times", dir / "ij_t.tif", world, iso)
+    tifffile.imwrite(dir / "ij_1.tif", grey, imagej=True, resolution=px, metadata={"unit": "mm", "axes": "ZYX"})
+    check("tifffile ImageJ, depth left out", dir / "ij_1.tif", world, (0.02, 0.02, 1.0))
+    for unit, per in (("\\u00B5m", 20), ("micron", 20), ("nm", 20000), ("cm", 0.002)):
+        path = dir / "ij_unit.tif"
+        tifffile.imwrite(path, grey, imagej=True, resolution=(1 / per, 1 / per), metadata={"spacing": 2.5 * per, "unit": unit, "axes": "ZYX"})
+        check(f"tifffile ImageJ in {unit}", path, world, iso)
+    ome = {"axes": "ZYX", "PhysicalSizeX": 0.02, "PhysicalSizeXUnit": "mm", "PhysicalSizeY": 20000, "PhysicalSizeYUnit": "nm", "PhysicalSizeZ": 0.005, "PhysicalSizeZUnit": "cm"}
+    tifffile.imwrite(dir / "units.ome.tif", GREY, metadata=ome)
+    check("tifffile OME, units of its own for each axis", dir / "units.ome.tif", world, iso)
+    pyramid = dir / "pyramid.ome.tif"
+    with tifffile.TiffWriter(pyramid, ome=True) as out:
+        out.write(GREY, subifds=1, metadata={"axes": "ZYX"})
+        out.write(GREY[:, ::2, ::2], subfiletype=1)
+    check("tifffile OME pyramid", pyramid, world, None, extra=("--spacing", "0.02"), grey=GREY)
+    thumbnail = dir / "thumbnail.tif"
+    with tifffile.TiffWriter(thumbnail) as out:
+        out.write(GREY[0, ::2, ::2], subfiletype=1, photometric="minisblack", metadata=None)
+        for page in GREY:
+            out.write(page, photometric="minisblack", metadata=None)
+    check("tifffile, a page of another resolution first", thumbnail, world, None, extra=("--spacing", "0.02"), grey=GREY)
+    path = dir / "palette.tif"
+    ramp = (np.arange(256, dtype=np.uint16) * 257)[::-1]
+    tifffile.imwrite(path, (GREY // 64).clip(0, 255).astype(np.uint8), photometric="palette", colormap=np.stack([ramp] * 3))
+    back = tifffile.imread(path)
+    check("tifffile palette that inverts", path, (back > 40).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", "40.5"), grey=back)
+    for dpi in (144, 240, 300, 2400):
+        path = dir / "dpi.tif"
+        tifffile.imwrite(path, GREY, photometric="minisblack", resolution=(dpi, dpi), resolutionunit=2)
+        same = ask("info", path)["spacing_mm"] is None
+        print(f"{'ok      ' if same else 'FAILED  '} tifffile {dpi} dpi: no voxel size")
+        FAILED.extend([] if same else [f"{dpi} dpi"])
     if needs("imagecodecs"):
-        for name in ("lzw", "packbits"):
-            path = dir / f"{name}.tif"
-            tifffile.imwrite(path, GREY, photometric="minisblack", compression=name)
-            check(f"tifffile {name}", path, world, None, extra=("--spacing", "0.02"), grey=GREY)
+        for name in ("lzw", "packbits", "zstd", "deflate"):
+            for predictor in (False, True):
+                if name == "packbits" and predictor:
+                    continue
+                for order in "<>":
+                    path = dir / f"{name}.tif"
+                    tifffile.imwrite(path, GREY, photometric="minisblack", compression=name, predictor=predictor, byteorder=order, tile=(16, 16) if predictor else None)
+                    check(f"tifffile {name}, predictor {predictor}, {order}", path, world, None, extra=("--spacing", "0.02"), grey=GREY)
+        path = dir / "float-predictor.tif"
+        tifffile.imwrite(path, GREY.astype(np.float32), photometric="minisblack", compression="zstd", predictor=3)
+        check("tifffile floats with their predictor", path, world, None, extra=("--spacing", "0.02"), grey=GREY)
+        for bits in (2, 3, 5, 6, 7, 9, 10, 12, 14, 15):
+            small = (GREY.clip(0).astype(np.uint32) >> 3) & ((1 << bits) - 1)
+            small = small.astype(np.uint8 if bits <= 8 else np.uint16)
+            path = dir / f"{bits}.tif"
+            tifffile.imwrite(path, small, photometric="minisblack", bitspersample=bits, rowsperstrip=GREY.shape[1])
+            back = tifffile.imread(path)
+            assert (back == small).all(), "tifffile reads something else"
+            lower = (1 << bits) // 2
+            check(f"tifffile {bits} bits", path, (back >= lower).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", lower), grey=back)
+        refused("tifffile LZMA", dir / "lzma.tif", "LZMA", lambda path: tifffile.imwrite(path, GREY, photometric="minisblack", compression="lzma"))
     tifffile.imwrite(dir / "float.tif", GREY.astype(np.float32), photometric="minisblack")
     check("tifffile float32", dir / "float.tif", world, None, extra=("--spacing", "0.02"))
     tifffile.imwrite(dir / "ome.ome.tif", GREY, metadata={"axes": "ZYX", "PhysicalSizeX": 20.0, "PhysicalSizeXUnit": "µm", "PhysicalSizeY": 20.0, "PhysicalSizeYUnit": "µm", "PhysicalSizeZ": 50.0, "PhysicalSizeZUnit": "µm"})
@@ -241,8 +536,30 @@ def numpy_files(dir):
     world = (GREY > 2999.5).astype(np.uint8)
     np.save(dir / "c.npy", GREY)
     np.save(dir / "f.npy", np.asfortranarray(GREY.astype(">f4")))
-    for name in ("c.npy", "f.npy"):
+    small = (GREY // 64).astype(np.float16)
+    np.save(dir / "half.npy", small)
+    np.save(dir / "one.npy", GREY[None, ..., None])
+    np.savez(dir / "scan.npz", spacing=np.array([0.02] * 3), scan=GREY)
+    np.savez_compressed(dir / "packed.npz", scan=np.asfortranarray(GREY))
+    for name in ("c.npy", "f.npy", "one.npy", "scan.npz", "packed.npz"):
         check(f"numpy {name}", dir / name, world, None, extra=("--spacing", "0.02"))
+    check("numpy half.npy", dir / "half.npy", (small > 46.5).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", "46.5"), grey=small)
+    for order in "<>":
+        for kind in ("u1", "i2", "u2", "i4", "f4", "f8"):
+            path = dir / "voxels.raw"
+            values = (GREY // 64).clip(0) if kind == "u1" else GREY.clip(0)
+            path.write_bytes(bytes(64) + values.astype(order + kind).tobytes())
+            lower = 46.5 if kind == "u1" else 2999.5
+            name = np.dtype(kind).name + ("be" if order == ">" else "")
+            contents = ",".join(map(str, GREY.shape[::-1])) + f",{name},64"
+            with tempfile.TemporaryDirectory() as out:
+                import nibabel
+
+                ask("segment", path, "-o", out, "--raw", contents, "--spacing", "0.02", "--lower", lower, "--keep-all")
+                found = np.asarray(nibabel.load(pathlib.Path(out) / "mask.nii.gz").dataobj).T
+            same = (found == (values > lower)).all()
+            print(f"{'ok      ' if same else 'FAILED  '} voxels without a header, {name}")
+            FAILED.extend([] if same else [name])
 
 
 def pillow_files(dir):
@@ -336,7 +653,7 @@ def main():
     if not needs("nibabel"):
         print("nothing can be checked without nibabel, which reads our masks")
         return 0
-    for group in (nibabel_files, simpleitk_files, pydicom_files, tifffile_files, numpy_files, pillow_files, aim_files):
+    for group in (nibabel_files, simpleitk_files, pynrrd_files, pydicom_files, tifffile_files, numpy_files, pillow_files, aim_files):
         with tempfile.TemporaryDirectory() as dir:
             try:
                 group(pathlib.Path(dir))

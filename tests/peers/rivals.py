@@ -5,12 +5,12 @@ usage: tests/peers/rivals.py [CASE ...]        (default: small; see CASES below 
 
     small            phantom of 2 mm at 0.05 mm, voxel FE: ParOSol, CalculiX
     thin[=SEED]      thin, hard phantom of about 1 M unknowns (BV/TV 12 %, struts of two voxels): ParOSol
-    stack            the shared stack coarsened twofold, ends bonded: ParOSol
-    lattice=LP       the shared stack (else a phantom) as SC floppy and firm lattices at nu = 1/4: LAMMPS
-    protocol         bonepd-ct alone: the paper's eight lattices, the shared stack (else a phantom) from file to report
-    full             bonepd-ct alone: the shared stack by voxel FE at full resolution
+    stack            the real stack coarsened twofold, ends bonded: ParOSol
+    lattice=LP       the real stack (else a phantom) as SC floppy and firm lattices at nu = 1/4: LAMMPS
+    protocol         bonepd-ct alone: the paper's eight lattices, the real stack (else a phantom) from file to report
+    full             bonepd-ct alone: the real stack by voxel FE at full resolution
     batch            bonepd-ct alone: eight phantoms in one run, one, two and four scans at a time: share of the cores in use
-    reference        the shared stack at full resolution, ends free and bonded, to 1e-7: ParOSol (half an hour)
+    reference        the real stack at full resolution, ends free and bonded, to 1e-7: ParOSol (half an hour)
 
 ParOSol is `parosol-py` (PyPI: pip install parosol-py, in the Python that runs this), CalculiX is `ccx` (Debian:
 calculix-ccx), LAMMPS is `lmp` (Debian: lammps). What is missing is skipped with its reason.
@@ -27,7 +27,7 @@ import lammps as export
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = pathlib.Path(os.environ.get("BONEPD_CT", ROOT / "target/release/bonepd-ct"))
-STACK = ROOT.parent / "shared/data/lhdl_3155_D_4_bc"
+STACK = pathlib.Path(os.environ.get("BONEPD_STACK", ROOT.parent / "shared/data/lhdl_3155_D_4_bc"))
 STACK_FLAGS = ["--spacing", "0.0195", "--gaussian", "1", "--lower", "63"]
 CORES = len(os.sched_getaffinity(0))
 RANKS = int(os.environ.get("RANKS", CORES))

@@ -247,7 +247,7 @@ fn the_papers_steps_take_few_iterations() {
         };
         let (summary, recorder) = simulate(&square.text()).unwrap();
         assert!(
-            summary.converged && !summary.pace.unwrap().changed(),
+            summary.converged && !summary.step_statistics.unwrap().changed(),
             "{:?}",
             recorder.lines
         );

@@ -135,7 +135,7 @@ fn a_step_that_halves_and_grows_says_so() {
     let text = format!("{}{ramp}{}", &plain[..from], &plain[to..]);
     let (summary, recorder) = simulate(&text).unwrap();
     assert!(summary.converged, "{summary:?}");
-    let pace = summary.pace.unwrap();
+    let pace = summary.step_statistics.unwrap();
     let said = |what: &str| recorder.lines.iter().filter(|l| l.contains(what)).count();
     assert!(pace.halvings >= 2 && pace.growths >= 2, "{pace:?}");
     assert_eq!(pace.halvings, said("step halved"), "{:?}", recorder.lines);
@@ -156,7 +156,7 @@ fn a_step_that_never_changed_has_nothing_to_say() {
         rows: 4,
         ..Square::new(10, 3.01)
     };
-    let pace = simulate(&square.text()).unwrap().0.pace.unwrap();
+    let pace = simulate(&square.text()).unwrap().0.step_statistics.unwrap();
     assert!(!pace.changed(), "{pace:?}");
 }
 

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::export::points;
 use crate::image::scan;
 use crate::record::stiffness;
+use crate::scene::continuum_molecular::Material;
 use crate::scene::setting::Inputs;
 use crate::scene::{Physics, Scene};
 use std::path::Path;
@@ -64,9 +65,12 @@ pub fn read_stiffness(scene: &Scene, folder: &Path) -> Result<Option<[[f64; 6]; 
     let Physics::ContinuumMolecular(model) = &scene.physics else {
         return Ok(None);
     };
-    let scan = model.elasticity.as_ref().and_then(|e| e.from_scan.as_ref());
-    scan.map(|s| stiffness::read(&folder.join(&s.file)))
-        .transpose()
+    match model.problem.elasticity().map(|e| &e.material) {
+        Some(Material::FromScan { scan, .. }) => {
+            stiffness::read(&folder.join(&scan.file)).map(Some)
+        }
+        _ => Ok(None),
+    }
 }
 
 /// One slice of a scan: the two other axes in order, the first fastest.

@@ -1,6 +1,6 @@
 //! Owns what a running scene leaves on disk: history, fields, maps, the animation, and the state to go on from.
 
-mod kept;
+mod saved_state;
 
 use super::differences::{self, Other, Scalars};
 use crate::discretisation::plane::Points;
@@ -19,7 +19,7 @@ use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How much time may pass without keeping the state anew.
+/// Longest time between two saved states.
 const EVERY: Duration = Duration::from_secs(10);
 
 /// Writes what a scene reports.
@@ -234,7 +234,7 @@ impl Observer for Writer<'_> {
         Ok(())
     }
 
-    /// A scene that stops tells of its last good state once more.
+    /// A scene that stops reports its last good state once more.
     fn again(&mut self, frame: &Frame) -> Result<()> {
         if self.history.last().is_some_and(|f| f.time == frame.time) {
             self.history.pop();

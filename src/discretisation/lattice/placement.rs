@@ -1,4 +1,4 @@
-//! Owns where lattice sites sit in a specimen and which of them exist: the floppy, firm and graded rules.
+//! Owns where lattice sites sit in a specimen and which of them exist: the floppy, firm, connected and weighted rules.
 
 pub(super) mod near_bone;
 
@@ -7,19 +7,18 @@ use crate::error::{Error, Result};
 use crate::grid::{Axis, Grid};
 use crate::volume::Volume;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 /// Which sites exist, and with what share of their stiffness.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Boundary {
     /// Sites within 1.1 first-neighbour distances of a bone voxel's centre.
     Firm,
     /// Sites whose position lies in a bone voxel.
     Floppy,
-    /// Sites weighted by the bone in their cell. SC: a site for each of its connected pieces
-    /// ([`crate::discretisation::lattice::connected`]); BCC, FCC: by its fraction.
-    Graded,
+    /// SC: a site for each connected component of bone in a cell ([`crate::discretisation::lattice::connected`]).
+    Connected,
+    /// BCC, FCC: sites weighted by the bone fraction of their cell.
+    Weighted,
 }
 
 impl Boundary {
@@ -27,12 +26,13 @@ impl Boundary {
         match self {
             Boundary::Firm => "firm",
             Boundary::Floppy => "floppy",
-            Boundary::Graded => "graded",
+            Boundary::Connected => "connected",
+            Boundary::Weighted => "weighted",
         }
     }
 }
 
-/// Cells with less bone than this carry no graded site (lem spec §5).
+/// Cells with less bone than this carry no weighted site: they are surface voxels' corners.
 const LEAST_FRACTION: f64 = 0.02;
 
 /// Places for sites that 32-bit numbers can count.
@@ -65,7 +65,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Lays candidates of `structure` over `grid`.
+    /// Places candidates of `structure` over `grid`.
     ///
     /// # Errors
     /// A lattice parameter that is not positive, leaves fewer than two planes or no site sideways, or has too many places.
@@ -89,8 +89,8 @@ impl Frame {
         let ring = match boundary {
             Boundary::Firm => reach.ceil() as usize - usize::from(structure == Structure::Sc),
             // A strip narrower than a cell is left over sideways: its bone counts, too.
-            Boundary::Graded => usize::from(structure == Structure::Sc),
-            Boundary::Floppy => 0,
+            Boundary::Connected => 1,
+            Boundary::Floppy | Boundary::Weighted => 0,
         };
         let (mut n, mut rings, mut first_mm) = ([0; 3], [0; 3], [0.0; 3]);
         for a in 0..3 {
@@ -173,14 +173,14 @@ impl Frame {
     }
 }
 
-/// Weight of every candidate: 0 where no site exists, 1 for firm and floppy sites, the bone fraction for graded ones.
-pub fn weigh(frame: &Frame, bone: &Volume<u8>, boundary: Boundary) -> Vec<f32> {
+/// Weight of every candidate: 0 where no site exists, 1 for firm and floppy sites, the bone fraction for weighted ones.
+pub fn site_weights(frame: &Frame, bone: &Volume<u8>, boundary: Boundary) -> Vec<f32> {
     if boundary == Boundary::Firm {
-        return near_bone::weigh(frame, bone);
+        return near_bone::site_weights(frame, bone);
     }
     let weight = |indices: [i32; 3]| match boundary {
         _ if !frame.structure.allows(indices) => 0.0,
-        Boundary::Graded => {
+        Boundary::Weighted => {
             let edge = frame.lp_mm * frame.structure.cell_volume().cbrt();
             let w = bone_fraction(bone, frame.position_mm(indices), edge);
             if w > LEAST_FRACTION { w as f32 } else { 0.0 }

@@ -14,7 +14,7 @@ pub struct Sites {
     pub indices: Vec<[i32; 3]>,
     /// A missing neighbour is the site itself (its bond then stretches by nothing).
     pub neighbours: Neighbours,
-    /// Stiffness over that of a whole site of the lattice's tissue, only where sites differ (graded, mixed tissue).
+    /// Stiffness over that of a whole site of the lattice's tissue, only where sites differ (weighted by bone, mixed tissue).
     pub weights: Option<Vec<f64>>,
     /// Planes (indices along the load axis) up to which, and from which, sites are gripped.
     pub grips: Grips,
@@ -54,9 +54,9 @@ impl Sites {
         let stencil = frame.structure.stencil();
         let kept = Numbered::from(load_carrying(&frame, &weights, &stencil, grips));
         let existing = weights.iter().filter(|&&w| w > 0.0).count();
-        let graded = weights.iter().any(|&w| w > 0.0 && w != 1.0);
+        let weighted = weights.iter().any(|&w| w > 0.0 && w != 1.0);
         let own = |c: usize| f64::from(weights[c]);
-        let own: Option<Vec<f64>> = graded.then(|| kept.iter().map(own).collect());
+        let own: Option<Vec<f64>> = weighted.then(|| kept.iter().map(own).collect());
         // A frame has many more candidates than sites, above all where structure is thin: none of it is kept for long.
         drop(weights);
         let mut indices = Vec::with_capacity(kept.len());

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 /// Multiplies every candidate's weight by the relative modulus of its tissue: the mean over the bone in its cell or,
 /// for a padded site without bone there, that of the nearest bone voxel.
-pub fn stiffen(frame: &Frame, bone: &Volume<u8>, tissue: &[f32], weights: &mut [f32]) {
+pub fn scale_by_tissue(frame: &Frame, bone: &Volume<u8>, tissue: &[f32], weights: &mut [f32]) {
     let edge = frame.lp_mm * frame.structure.cell_volume().cbrt();
     weights.par_iter_mut().enumerate().for_each(|(c, weight)| {
         if *weight > 0.0 {

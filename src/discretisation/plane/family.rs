@@ -170,7 +170,7 @@ impl Family {
 mod tests {
     use super::*;
 
-    /// Counts and sums of spec B3 (Hu's partial volumes) and A2 (none).
+    /// Counts and sums with Hu's partial volumes, and without.
     #[test]
     fn stencils_count_as_published() {
         let hu = |m: f64| Stencil::new(1.0, m, true).unwrap();

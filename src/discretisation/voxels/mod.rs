@@ -65,6 +65,9 @@ impl Planes {
     }
 }
 
+/// Bit of [`VoxelMesh::around`] of the element on the side of larger x, y, z.
+const LOW_CORNER_OF: u8 = 1 << 7;
+
 /// One brick per voxel, those only that can carry load from grip to grip.
 #[derive(Debug, Clone)]
 pub struct VoxelMesh {
@@ -191,6 +194,11 @@ impl VoxelMesh {
         std::array::from_fn(|a| f64::from(at[a]) * self.grid.spacing_mm[a])
     }
 
+    /// Whether the element of which `node` is the corner of smallest x, y, z exists.
+    pub fn has_element(&self, node: usize) -> bool {
+        self.around[node] & LOW_CORNER_OF != 0
+    }
+
     /// The element of which each node is the corner of smallest x, y, z, in the order of the nodes, as indices into
     /// the grid; None where that element does not exist.
     pub fn low_corner_elements(&self) -> impl Iterator<Item = Option<usize>> + '_ {
@@ -198,7 +206,7 @@ impl VoxelMesh {
             s.nodes().map(move |node| {
                 let x = s.at[0] as usize + node - s.start as usize;
                 let at = [x, s.at[1] as usize, s.at[2] as usize];
-                (self.around[node] & 0x80 != 0).then(|| self.grid.index(at))
+                self.has_element(node).then(|| self.grid.index(at))
             })
         })
     }

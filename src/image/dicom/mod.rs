@@ -1,268 +1,225 @@
-//! Owns DICOM series: slices sorted by position along their normal, rescaled to HU. Names of persons are not read.
+//! Owns DICOM series, single-frame and multi-frame: slices in their order along the normal, rescaled to the unit that the
+//! series names. Names of persons are not looked at.
+//!
+//! The elements are read here and not by a crate: crates take memory as an element's length says, and do not read VR UN with
+//! implicit items.
+//!
+//! What is done with the attributes that place pixels or give them a meaning (PS3.3 and PS3.6); others describe the patient,
+//! the study and the display, and are harmless:
+//!
+//! | attribute | use | why |
+//! |---|---|---|
+//! | (0002,0010) TransferSyntaxUID | read | byte order, deflation, RLE and JPEG; other compressions are refused |
+//! | (0008,0008) ImageType | harmless | a localiser has another size or orientation and is refused by that |
+//! | (0008,0016) SOPClassUID | read | CT without a RescaleType is in HU |
+//! | (0008,0060) Modality | read | CT without a RescaleType is in HU |
+//! | (0018,0050) SliceThickness | read | distance of slices where positions and spacing are missing |
+//! | (0018,0088) SpacingBetweenSlices | read | distance of slices where positions are missing; below zero it is refused there |
+//! | (0018,1120) GantryDetectorTilt | harmless | positions show a tilt, and are refused by that |
+//! | (0018,1164) ImagerPixelSpacing | harmless | at the detector of a projection, not in the body |
+//! | (0020,000E) SeriesInstanceUID | read | several series are refused |
+//! | (0020,0013) InstanceNumber | read | order of slices without a place |
+//! | (0020,0032) ImagePositionPatient | read | order, distance and place of slices |
+//! | (0020,0037) ImageOrientationPatient | read | orientation |
+//! | (0020,0100) TemporalPositionIdentifier | harmless | slices of two times lie at one place and are refused by that |
+//! | (0020,1041) SliceLocation | read | order and distance of slices without a position |
+//! | (0020,9113) PlanePositionSequence | read | of each frame |
+//! | (0020,9116) PlaneOrientationSequence | read | of each frame |
+//! | (0028,0002) SamplesPerPixel | read | colours are refused |
+//! | (0028,0004) PhotometricInterpretation | read | colours and palettes are refused; MONOCHROME1 is not inverted |
+//! | (0028,0006) PlanarConfiguration | harmless | of colours |
+//! | (0028,0008) NumberOfFrames | read | slices of a multi-frame file |
+//! | (0028,0010) Rows | read | size |
+//! | (0028,0011) Columns | read | size |
+//! | (0028,0030) PixelSpacing | read | voxel size; has to be that of all slices |
+//! | (0028,0034) PixelAspectRatio | harmless | only where there is no voxel size, which is then asked for |
+//! | (0028,0100) BitsAllocated | read | 1, 32 and 64 bits are refused |
+//! | (0028,0101) BitsStored | read | higher bits may hold overlays |
+//! | (0028,0102) HighBit | read | place of the stored bits |
+//! | (0028,0103) PixelRepresentation | read | sign |
+//! | (0028,0106) SmallestImagePixelValue | harmless | of the values |
+//! | (0028,0120) PixelPaddingValue | read | passed on as padding |
+//! | (0028,0121) PixelPaddingRangeLimit | read | passed on as padding |
+//! | (0028,1050) WindowCenter | harmless | of a display |
+//! | (0028,1052) RescaleIntercept | read | scale, slice by slice |
+//! | (0028,1053) RescaleSlope | read | scale, slice by slice |
+//! | (0028,1054) RescaleType | read | unit |
+//! | (0028,2110) LossyImageCompression | noted | values are not the scanner's |
+//! | (0028,3000) ModalityLUTSequence | read | table of values and their unit |
+//! | (0028,3010) VOILUTSequence | harmless | of a display |
+//! | (0028,9110) PixelMeasuresSequence | read | of each frame |
+//! | (0028,9145) PixelValueTransformationSequence | read | of each frame |
+//! | (0040,9096) RealWorldValueMappingSequence | noted | a further scale, which is not used |
+//! | (2050,0020) PresentationLUTShape | harmless | of a display |
+//! | (3004,000C) GridFrameOffsetVector | read | places of the frames of a file without functional groups |
+//! | (5200,9229) SharedFunctionalGroupsSequence | read | of all frames |
+//! | (5200,9230) PerFrameFunctionalGroupsSequence | read | of each frame |
+//! | (6000,3000) OverlayData | harmless | drawn over the image |
+//! | (7FE0,0008) FloatPixelData | refused | floating-point pixels |
+//! | (7FE0,0009) DoubleFloatPixelData | refused | floating-point pixels |
+//! | (7FE0,0010) PixelData | read | the pixels |
 
-mod lengths;
+mod coding;
+mod compressed;
+mod elements;
+mod frames;
+mod head;
+mod pixels;
+mod scale;
+mod stack;
+mod walk;
 
 use crate::error::{Error, Result};
-use crate::image::orient::{Affine, from_lps};
+use crate::image::orient::{Affine, from_lps, scaled};
 use crate::image::stored::Stored;
-use dicom_object::{DefaultDicomObject, OpenFileOptions, Tag};
-use dicom_pixeldata::PixelDecoder;
+use frames::{Frame, normal};
+use head::{Found, Image};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 const ADVICE: &str =
-    "export the series again as uncompressed DICOM, or convert it to NIfTI (dcm2niix)";
-const PIXEL_DATA: Tag = Tag(0x7FE0, 0x0010);
+    "convert the series to NIfTI (dcm2niix), or export it again as uncompressed DICOM";
 
-/// What one slice says of itself.
-struct Head {
-    path: PathBuf,
-    rows: usize,
-    columns: usize,
-    frames: usize,
-    series: String,
-    /// Of rows, then of columns, in mm.
-    pixel_mm: Option<[f64; 2]>,
-    position: Option<[f64; 3]>,
-    /// Direction along a row, then along a column.
-    directions: Option<[f64; 6]>,
-    instance: f64,
-    thickness: Option<f64>,
-    rescaled: bool,
-}
-
-impl Head {
-    /// Distance along the normal, or the number of the slice where positions are missing.
-    fn along(&self) -> f64 {
-        match (self.position, self.directions) {
-            (Some(p), Some(d)) => dot(p, normal(&d)),
-            _ => self.instance,
-        }
-    }
-}
-
+/// Reads the files of a folder, or one file, as one volume.
+///
+/// # Errors
+/// No images, several series, slices that make no stack of boxes, codings that are not read.
 pub fn read(folder: &Path, files: &[PathBuf]) -> Result<Stored> {
-    let mut heads: Vec<Head> = files.par_iter().map(|f| head(f)).collect::<Result<_>>()?;
-    heads.sort_by(|a, b| a.along().total_cmp(&b.along()));
-    let Some(first) = heads.first() else {
-        return Err(Error::file(folder, "holds no DICOM slices", ADVICE));
-    };
-    for other in &heads {
-        same_series(first, other)?;
-    }
-    let (nx, ny, nz) = (first.columns, first.rows, first.frames * heads.len());
-    let plane = nx * ny;
-    let promised = plane.saturating_mul(nz);
-    let on_disk: u64 = heads
-        .iter()
-        .filter_map(|h| std::fs::metadata(&h.path).ok())
-        .map(|m| m.len())
-        .sum();
-    // Nothing that is decoded here packs more than a hundredfold.
-    if promised == 0 || promised as u64 > on_disk.saturating_mul(100) {
-        return Err(Error::file(
-            &first.path,
-            format!(
-                "the headers promise {nx} × {ny} × {nz} voxels, the files hold {on_disk} bytes"
-            ),
-            ADVICE,
-        ));
-    }
     let mut notes = Vec::new();
-    let slice_mm = slice_distance(&heads, &mut notes)?;
-    let mut values = vec![0f32; promised];
-    values
-        .par_chunks_mut(plane * first.frames)
-        .zip(&heads)
-        .try_for_each(|(out, head)| decode(head, out))?;
+    let images = images(folder, files, &mut notes)?;
+    let mut frames: Vec<Frame> = images.iter().flat_map(|i| i.frames.clone()).collect();
+    for other in &frames[1..] {
+        stack::same(&frames[0], other, &images)?;
+    }
+    check_size(&images, frames.len())?;
+    let distance_mm = stack::sort(&mut frames, &images, &mut notes)?;
+    let (first, image) = (&frames[0], &images[frames[0].file]);
+    let n = [image.columns, image.rows, frames.len()];
     let spacing_mm = first
         .pixel_mm
-        .zip(slice_mm)
+        .zip(distance_mm)
         .map(|([row, column], z)| [column, row, z]);
+    let values = values(&images, &frames, n)?;
+    notes.extend(further(&images));
     Ok(Stored {
-        format: format!("DICOM series of {} files", heads.len()),
-        n: [nx, ny, nz],
+        format: match (files.len(), frames.len()) {
+            (1, 1) => "DICOM".into(),
+            (1, count) => format!("DICOM of {count} frames"),
+            _ => format!("DICOM series of {} files", images.len()),
+        },
+        n,
         values,
-        affine: spacing_mm.and_then(|s| affine(first, s)),
+        affine: affine(first, spacing_mm),
         spacing_mm,
-        unit: first.rescaled.then(|| "HU".to_string()),
+        unit: first.scale.unit.clone(),
+        padding: image.padding.map(|range| {
+            let [a, b] = range.map(|v| first.scale.value(f64::from(v)));
+            [a.min(b), a.max(b)]
+        }),
         notes,
         ..Stored::default()
     })
 }
 
-fn same_series(first: &Head, other: &Head) -> Result<()> {
-    let differs = |what: String, advice: &str| Err(Error::file(&other.path, what, advice));
-    if (other.rows, other.columns, other.frames) != (first.rows, first.columns, first.frames) {
-        return differs(
-            format!(
-                "slice of {} × {} pixels in a series whose first slice has {} × {}",
-                other.columns, other.rows, first.columns, first.rows
-            ),
-            "keep one series in a folder, without localisers",
-        );
-    }
-    if other.series != first.series {
-        return differs(
-            "belongs to another series than the first slice".into(),
-            "keep one series in a folder: sort the files by SeriesInstanceUID",
-        );
-    }
-    Ok(())
-}
-
-fn open(path: &Path, pixels: bool) -> Result<DefaultDicomObject> {
-    let bytes = std::fs::read(path).map_err(|e| {
-        Error::file(
-            path,
-            format!("cannot be read: {e}"),
-            "check the path and its permissions",
-        )
-    })?;
-    if let Some(fault) = lengths::fault(&bytes) {
-        return Err(Error::file(
-            path,
-            format!("is no sound DICOM file: {fault}"),
-            ADVICE,
-        ));
-    }
-    let mut options = OpenFileOptions::new();
-    if !pixels {
-        options = options.read_until(PIXEL_DATA);
-    }
-    options
-        .from_reader(&bytes[..])
-        .map_err(|e| Error::file(path, format!("cannot be read as DICOM ({e})"), ADVICE))
-}
-
-fn head(path: &Path) -> Result<Head> {
-    let object = open(path, false)?;
-    let text = |group, element| -> Option<String> {
-        let value = object.element_opt(Tag(group, element)).ok()??;
-        Some(value.to_str().ok()?.trim().trim_matches('\0').to_string())
-    };
-    let numbers = |group, element| -> Vec<f64> {
-        let text = text(group, element).unwrap_or_default();
-        text.split('\\')
-            .filter_map(|w| w.trim().parse().ok())
-            .filter(|v: &f64| v.is_finite())
-            .collect()
-    };
-    let number = |group, element| numbers(group, element).first().copied();
-    let count = |group, element| {
-        number(group, element)
-            .filter(|v| (0.0..65536.0).contains(v))
-            .map(|v| v as usize)
-    };
-    let (Some(rows), Some(columns)) = (count(0x0028, 0x0010), count(0x0028, 0x0011)) else {
-        return Err(Error::file(
-            path,
-            "holds no image: Rows and Columns are missing",
-            ADVICE,
-        ));
-    };
-    // The decoder makes a table of all values: 24 bits would be 64 MiB for a slice of any size.
-    if !count(0x0028, 0x0101).is_some_and(|bits| (1..=16).contains(&bits)) {
-        return Err(Error::file(
-            path,
-            "holds no image: Bits Stored should be 1 to 16",
-            ADVICE,
-        ));
-    }
-    let positive = |v: &f64| *v > 0.0;
-    Ok(Head {
-        path: path.to_path_buf(),
-        rows,
-        columns,
-        frames: count(0x0028, 0x0008).unwrap_or(1).max(1),
-        series: text(0x0020, 0x000E).unwrap_or_default(),
-        pixel_mm: numbers(0x0028, 0x0030)
-            .try_into()
-            .ok()
-            .filter(|p: &[f64; 2]| p.iter().all(positive)),
-        position: numbers(0x0020, 0x0032).try_into().ok(),
-        directions: numbers(0x0020, 0x0037).try_into().ok(),
-        instance: number(0x0020, 0x0013).unwrap_or(0.0),
-        thickness: number(0x0018, 0x0088)
-            .or(number(0x0018, 0x0050))
-            .map(f64::abs)
-            .filter(positive),
-        rescaled: number(0x0028, 0x1053).is_some(),
-    })
-}
-
-fn decode(head: &Head, out: &mut [f32]) -> Result<()> {
-    let wrong = |found: String| Error::file(&head.path, found, ADVICE);
-    let object = open(&head.path, true)?;
-    let pixels = object
-        .decode_pixel_data()
-        .map_err(|e| wrong(format!("its pixels cannot be decoded ({e})")))?;
-    let values: Vec<f32> = pixels
-        .to_vec()
-        .map_err(|e| wrong(format!("its pixels cannot be decoded ({e})")))?;
-    if values.len() != out.len() {
-        return Err(wrong(format!(
-            "{} pixels decoded where {} were expected",
-            values.len(),
-            out.len()
-        )));
-    }
-    out.copy_from_slice(&values);
-    Ok(())
-}
-
-/// Distance of neighbouring slices; they must be evenly spaced.
-fn slice_distance(heads: &[Head], notes: &mut Vec<String>) -> Result<Option<f64>> {
-    let placed = heads
-        .iter()
-        .all(|h| h.position.is_some() && h.directions.is_some());
-    let [first, .., last] = heads else {
-        return Ok(heads[0].thickness);
-    };
-    if !placed {
-        notes.push("slices carry no position: sorted by their number, their distance taken from the thickness".into());
-        return Ok(first.thickness);
-    }
-    let mean = (last.along() - first.along()) / (heads.len() - 1) as f64;
-    for pair in heads.windows(2) {
-        let gap = pair[1].along() - pair[0].along();
-        // Positions are written to about 1e-4 mm; a missing slice is a whole gap.
-        if (gap - mean).abs() > 0.05 * mean + 2e-4 || mean <= 0.0 {
-            return Err(Error::file(
-                &pair[1].path,
-                format!(
-                    "lies {gap:.4} mm after the slice before it, where slices are {mean:.4} mm apart on average"
-                ),
-                "a slice is missing or doubled: export the whole series",
-            ));
+/// The files with pixels. Directories and reports among them are left out and said.
+fn images(folder: &Path, files: &[PathBuf], notes: &mut Vec<String>) -> Result<Vec<Image>> {
+    let all: Vec<Found> = files
+        .par_iter()
+        .map(|file| head::found(file, 0))
+        .collect::<Result<_>>()?;
+    let mut images: Vec<Image> = Vec::new();
+    let mut others = Vec::new();
+    for (file, found) in files.iter().zip(all) {
+        match found {
+            Found::Image(image) => images.push(*image),
+            Found::Other(what) => {
+                let name = file.file_name().unwrap_or_default().to_string_lossy();
+                others.push(format!("{name} ({what})"));
+            }
         }
     }
-    Ok(Some((mean * 1e7).round() / 1e7))
+    for (file, image) in images.iter_mut().enumerate() {
+        image.frames.iter_mut().for_each(|frame| frame.file = file);
+    }
+    if images.is_empty() {
+        return Err(Error::file(
+            folder,
+            format!("holds no image: {}", others.join(", ")),
+            "give the files with the pixels, not their directory or report",
+        ));
+    }
+    if !others.is_empty() {
+        notes.push(format!("left out, without an image: {}", others.join(", ")));
+    }
+    Ok(images)
 }
 
-fn normal(d: &[f64; 6]) -> [f64; 3] {
-    let [a, b, c, x, y, z] = *d;
-    [b * z - c * y, c * x - a * z, a * y - b * x]
+/// Refuses headers that promise more than their files can hold, before memory is taken.
+fn check_size(images: &[Image], slices: usize) -> Result<()> {
+    let on_disk: u64 = images
+        .iter()
+        .filter_map(|image| std::fs::metadata(&image.path).ok())
+        .map(|m| m.len())
+        .sum();
+    let (rows, columns) = (images[0].rows, images[0].columns);
+    let promised = (rows * columns).saturating_mul(slices) as u64;
+    // Neither deflate nor run lengths nor JPEG pack more densely.
+    if promised <= on_disk.saturating_mul(crate::image::raw::MAX_EXPANSION) {
+        return Ok(());
+    }
+    Err(Error::file(
+        &images[0].path,
+        format!(
+            "the headers promise {columns} × {rows} × {slices} voxels, the files hold {on_disk} bytes"
+        ),
+        ADVICE,
+    ))
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// Every frame at its place, files in parallel.
+fn values(images: &[Image], frames: &[Frame], [nx, ny, nz]: [usize; 3]) -> Result<Vec<f32>> {
+    let mut values = vec![0f32; nx * ny * nz];
+    let mut slices: Vec<Vec<(usize, &mut [f32])>> = images.iter().map(|_| Vec::new()).collect();
+    for (frame, slice) in frames.iter().zip(values.chunks_mut(nx * ny)) {
+        slices[frame.file].push((frame.index, slice));
+    }
+    images
+        .par_iter()
+        .zip(slices)
+        .try_for_each(|(image, slices)| pixels::decode(image, slices))?;
+    Ok(values)
 }
 
-fn affine(first: &Head, s: [f64; 3]) -> Option<Affine> {
-    let (d, origin) = (first.directions?, first.position?);
+fn further(images: &[Image]) -> Vec<String> {
+    let mut notes = Vec::new();
+    if images.iter().any(|image| image.lossy) {
+        notes.push(
+            "the series was once compressed with loss: its values are not the scanner's".into(),
+        );
+    }
+    if images.iter().any(|image| image.other_scales) {
+        notes.push("the series names a further scale of its values (RealWorldValueMapping), which is not used".into());
+    }
+    notes
+}
+
+/// Where the spacing is unknown the columns are unit vectors.
+fn affine(first: &Frame, spacing_mm: Option<[f64; 3]>) -> Option<Affine> {
+    let d = first.directions?;
     let normal = normal(&d);
-    Some(from_lps(std::array::from_fn(|r| {
-        [d[r] * s[0], d[3 + r] * s[1], normal[r] * s[2], origin[r]]
-    })))
+    let origin = first.position_mm.unwrap_or([0.0; 3]);
+    let directions: Affine = std::array::from_fn(|r| [d[r], d[3 + r], normal[r], origin[r]]);
+    Some(scaled(
+        &from_lps(directions),
+        spacing_mm.unwrap_or([1.0; 3]),
+    ))
 }
 
-/// Whether a file is DICOM by its magic word, whatever its name.
+/// Whether a file is DICOM by its first bytes, whatever its name.
 pub fn is_dicom(path: &Path) -> bool {
     use std::io::Read;
-    let mut head = [0u8; 132];
+    let mut head = Vec::new();
     std::fs::File::open(path)
-        .and_then(|mut f| f.read_exact(&mut head))
-        .is_ok()
-        && &head[128..] == b"DICM"
+        .and_then(|file| file.take(132).read_to_end(&mut head))
+        .is_ok_and(|_| head.get(128..132) == Some(b"DICM") || walk::without_preamble(&head))
 }

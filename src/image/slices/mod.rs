@@ -2,11 +2,13 @@
 
 pub mod bitmap;
 pub mod series;
+pub mod skyscan;
 
 use crate::error::{Error, Result};
 use crate::image::slices::series::Series;
 use crate::image::stored::{Slice, Stored, spacing};
-use crate::image::{dicom, raw, tiff};
+use crate::image::{dicom, tiff};
+use crate::io::own_files;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -47,11 +49,7 @@ fn listed(folder: &Path) -> Result<Series> {
         ));
     }
     if found.is_empty() {
-        return Err(Error::file(
-            folder,
-            "holds no slices",
-            "give a folder of slices (TIFF, PNG, BMP or DICOM), or a scan file",
-        ));
+        return Err(no_slices(folder));
     }
     match kind(&found[0]) {
         Some("dcm") => Ok(Series {
@@ -60,6 +58,25 @@ fn listed(folder: &Path) -> Result<Series> {
         }),
         _ => series::ordered(folder, found),
     }
+}
+
+fn no_slices(folder: &Path) -> Error {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let jpeg = entries
+        .map(|e| file_name(&e.path()).to_lowercase())
+        .any(|name| name.ends_with(".jpg") || name.ends_with(".jpeg"));
+    if jpeg {
+        return Error::file(
+            folder,
+            "holds JPEG pictures, whose compression changes grey values: they are not read as slices",
+            "export the slices from the reconstruction as TIFF, PNG or BMP",
+        );
+    }
+    Error::file(
+        folder,
+        "holds no slices",
+        "give a folder of slices (TIFF, PNG, BMP or DICOM), or a scan file",
+    )
 }
 
 fn file_name(path: &Path) -> String {
@@ -81,7 +98,7 @@ fn kind(path: &Path) -> Option<&'static str> {
     let stem = name
         .rsplit_once('.')
         .map_or(name.as_str(), |(stem, _)| stem);
-    if name.starts_with('.') || stem.ends_with("_spr") {
+    if name.starts_with('.') || stem.ends_with("_spr") || own_files::is_result(path) {
         return None;
     }
     let by_name = [
@@ -90,17 +107,13 @@ fn kind(path: &Path) -> Option<&'static str> {
         ("png", ".png"),
         ("bmp", ".bmp"),
         ("dcm", ".dcm"),
+        ("dcm", ".dicom"),
         ("dcm", ".ima"),
     ];
     let found = by_name
         .into_iter()
         .find_map(|(kind, end)| name.ends_with(end).then_some(kind));
-    let unnamed = !name.contains('.')
-        || name
-            .rsplit('.')
-            .next()
-            .is_some_and(|e| e.bytes().all(|c| c.is_ascii_digit()));
-    found.or_else(|| (unnamed && dicom::is_dicom(path)).then_some("dcm"))
+    found.or_else(|| dicom::is_dicom(path).then_some("dcm"))
 }
 
 /// Order of names in which runs of digits compare as numbers.
@@ -135,6 +148,28 @@ pub fn read(folder: &Path) -> Result<Stored> {
         _ => {}
     }
     let first = decode(&files[0])?;
+    let values = assembled(folder, &files, &first)?;
+    let n = [first.width, first.height, files.len()];
+    let mut notes = first.notes.clone();
+    notes.extend(first.grey.notes());
+    let spacing_mm = size(folder, &files[0], step, &first, n, &mut notes);
+    Ok(Stored {
+        format: format!(
+            "{} slices ({}), {}",
+            n[2],
+            kind(&files[0]).unwrap_or("?"),
+            first.stored_as
+        ),
+        n,
+        values,
+        spacing_mm,
+        unit: first.grey.unit(),
+        notes,
+        ..Stored::default()
+    })
+}
+
+fn assembled(folder: &Path, files: &[PathBuf], first: &Slice) -> Result<Vec<f32>> {
     let (nx, ny, nz) = (first.width, first.height, files.len());
     let plane = nx * ny;
     let mut values = Vec::new();
@@ -148,51 +183,87 @@ pub fn read(folder: &Path) -> Result<Stored> {
             )
         })?;
     values.resize(plane * nz, 0.0f32);
-    values.par_chunks_mut(plane).zip(&files).enumerate().try_for_each(|(k, (out, file))| {
-        let slice = if k == 0 { first.clone() } else { decode(file)? };
-        if (slice.width, slice.height) != (nx, ny) {
-            return Err(Error::file(
-                file,
-                format!(
-                    "slice of {} × {} pixels in a scan whose first slice ({}) has {nx} × {ny}",
-                    slice.width,
-                    slice.height,
-                    file_name(&files[0])
-                ),
-                "remove what is no slice of this scan from the folder, or export the slice again",
-            ));
+    let planes = values.par_chunks_mut(plane).zip(files).enumerate();
+    planes.try_for_each(|(k, (out, file))| {
+        if k == 0 {
+            out.copy_from_slice(&first.values);
+            return Ok(());
         }
+        let slice = decode(file)?;
+        same_kind(first, &slice, &files[0], file)?;
         out.copy_from_slice(&slice.values);
         Ok(())
     })?;
-    let mut notes = first.grey.notes();
+    Ok(values)
+}
+
+/// Whether two slices can be of one scan.
+fn same_kind(first: &Slice, slice: &Slice, first_file: &Path, file: &Path) -> Result<()> {
+    let first_name = file_name(first_file);
+    let wrong = |found: String| {
+        Err(Error::file(
+            file,
+            found,
+            "remove what is no slice of this scan from the folder, or export the slice again",
+        ))
+    };
+    let [(nx, ny), (mx, my)] = [first, slice].map(|s| (s.width, s.height));
+    if (nx, ny) != (mx, my) {
+        return wrong(format!(
+            "slice of {mx} × {my} pixels in a scan whose first slice ({first_name}) has {nx} × {ny}"
+        ));
+    }
+    if slice.stored_as != first.stored_as {
+        return wrong(format!(
+            "slice of {} in a scan whose first slice ({first_name}) is {}: their grey values do not mean the same",
+            slice.stored_as, first.stored_as
+        ));
+    }
+    if slice.grey != first.grey {
+        return wrong(format!(
+            "its grey values are calibrated (ImageJ) otherwise than those of the first slice ({first_name})"
+        ));
+    }
+    let differ = |a: f64, b: f64| (a / b - 1.0).abs() > 1e-3;
+    if let (Some(a), Some(b)) = (first.pixel_mm, slice.pixel_mm)
+        && (differ(a[0], b[0]) || differ(a[1], b[1]))
+    {
+        return wrong(format!(
+            "has pixels of {} × {} mm in a scan whose first slice ({first_name}) has {} × {} mm",
+            b[0], b[1], a[0], a[1]
+        ));
+    }
+    Ok(())
+}
+
+/// Voxel size: of a reconstruction's log, which knows it, before that of tags.
+fn size(
+    folder: &Path,
+    first_file: &Path,
+    step: u128,
+    first: &Slice,
+    [nx, ny, nz]: [usize; 3],
+    notes: &mut Vec<String>,
+) -> Option<[f64; 3]> {
+    if let Some(log) = skyscan::beside(folder, first_file, notes)
+        && let Some(size) = log.spacing_mm(step, [nx, ny], notes)
+    {
+        if let Some(pixel) = first.pixel_mm
+            && (pixel[0] / size[0] - 1.0).abs() > 0.01
+        {
+            notes.push(format!(
+                "the slices' own tags say pixels of {} mm: the log was taken",
+                pixel[0]
+            ));
+        }
+        return Some(size);
+    }
     if step > 1 {
         notes.push(format!(
             "the slices' numbers go in steps of {step}: if slices were left out, their distance is larger than in the scanner (--spacing)"
         ));
     }
-    let mut spacing_mm = spacing(&first, &mut notes);
-    if spacing_mm.is_none()
-        && let Some(mm) = logged_pixel_mm(folder)
-    {
-        notes.push(format!(
-            "voxel size {mm} mm from the reconstruction log beside the slices"
-        ));
-        spacing_mm = Some([mm; 3]);
-    }
-    Ok(Stored {
-        format: format!(
-            "{nz} slices ({}), {}",
-            kind(&files[0]).unwrap_or("?"),
-            first.stored_as
-        ),
-        n: [nx, ny, nz],
-        values,
-        spacing_mm,
-        unit: first.grey.unit(),
-        notes,
-        ..Stored::default()
-    })
+    spacing(first.pixel_mm, first.slice_mm, nz, notes)
 }
 
 fn decode(file: &Path) -> Result<Slice> {
@@ -200,31 +271,6 @@ fn decode(file: &Path) -> Result<Slice> {
         Some("png" | "bmp") => bitmap::read_slice(file),
         _ => tiff::read_slice(file),
     }
-}
-
-/// Voxel size in a reconstruction log (SkyScan's NRecon: `Pixel Size (um)=17.4`) beside the slices; the last one counts.
-fn logged_pixel_mm(folder: &Path) -> Option<f64> {
-    let logs = std::fs::read_dir(folder)
-        .ok()?
-        .filter_map(|e| e.ok())
-        .map(|e| e.path());
-    let mut logs: Vec<PathBuf> = logs
-        .filter(|p| file_name(p).to_lowercase().ends_with(".log"))
-        .collect();
-    logs.sort();
-    let text = raw::head(logs.first()?, 1 << 20).ok()?;
-    let text = String::from_utf8_lossy(&text);
-    let mut sizes = text.lines().filter_map(|line| {
-        line.trim()
-            .split_once("Pixel Size (um)=")?
-            .1
-            .trim()
-            .parse::<f64>()
-            .ok()
-    });
-    sizes
-        .rfind(|v| v.is_finite() && *v > 0.0)
-        .map(|um| um / 1000.0)
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Owns the check that a TIFF file's directories ask for no more than the file holds. The decoder takes memory as an
 //! entry's count says, before it reads: a damaged file of a few hundred bytes could ask for gigabytes.
 
-use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
 /// More directories than this are no scan's (and a chain that bites its tail ends here).
@@ -9,10 +8,9 @@ const DIRECTORIES: usize = 100_000;
 
 /// None if all entries of all directories lie within the file; else what is wrong. What is no TIFF at all is left to the
 /// decoder to say.
-pub fn fault(file: &File) -> Option<String> {
-    let bytes = file.metadata().ok()?.len();
+pub fn fault(source: &mut (impl Read + Seek), bytes: u64) -> Option<String> {
     let mut walk = Walk {
-        source: BufReader::new(file),
+        source: BufReader::new(source),
         bytes,
         big_endian: false,
         wide: false,
@@ -20,8 +18,8 @@ pub fn fault(file: &File) -> Option<String> {
     walk.directories().err()
 }
 
-struct Walk<'a> {
-    source: BufReader<&'a File>,
+struct Walk<R> {
+    source: BufReader<R>,
     bytes: u64,
     big_endian: bool,
     /// BigTIFF: counts and offsets of 8 bytes.
@@ -30,7 +28,7 @@ struct Walk<'a> {
 
 type Step<T> = std::result::Result<T, String>;
 
-impl Walk<'_> {
+impl<R: Read + Seek> Walk<R> {
     fn directories(&mut self) -> Step<()> {
         let mut order = [0u8; 2];
         if self.source.read_exact(&mut order).is_err() {

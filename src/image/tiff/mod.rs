@@ -1,29 +1,43 @@
-//! Owns TIFF: single slices, multi-page stacks, BigTIFF, ImageJ's stacks and their voxel sizes.
+//! Owns TIFF: single slices, multi-page stacks, BigTIFF, and their voxel sizes. Which tags are read is listed in [`tags`]; what
+//! ImageJ and OME write into the description in [`crate::image::description`].
+
+mod chunks;
+mod codec;
+mod described;
+mod scale;
+mod storage;
+pub mod tags;
 
 pub mod directories;
 
 use crate::error::{Error, Result};
-use crate::image::imagej::{Grey, imagej, unit_mm};
-use crate::image::raw;
-use crate::image::raw::{Layout, Scalar};
-use crate::image::stored;
-use crate::image::stored::{Slice, Stored};
+use crate::image::description::imagej::Grey;
+use crate::image::raw::{self, Layout};
+use crate::image::stored::{self, Slice, Stored};
 use crate::volume::Volume;
+use chunks::{Fault, Places};
+use codec::Samples;
+use described::{Described, described};
 use std::fs::File;
-use std::io::{BufReader, Seek, SeekFrom};
+use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
-use tiff::ColorType;
+use storage::{Storage, numbers, storage};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::encoder::{Compression, DeflateLevel, Rational, TiffEncoder, colortype};
 use tiff::tags::Tag;
 
 const DAMAGED: &str =
-    "the file is truncated, damaged or of a rare kind: export it again as plain grey-value TIFF";
+    "the file is truncated or damaged: copy it again, or export it again as plain grey-value TIFF";
 /// Larger pages than this are refused (an 8-bit page of 46 000 × 46 000 pixels).
 const PAGE_BYTES: u64 = 2 << 30;
+/// Files up to this size are read at once.
+const AT_ONCE: u64 = 32 << 20;
+
+trait Source: Read + Seek {}
+impl<T: Read + Seek> Source for T {}
 
 struct Pages {
-    decoder: Decoder<BufReader<File>>,
+    decoder: Decoder<Box<dyn Source>>,
     file_bytes: u64,
 }
 
@@ -35,21 +49,27 @@ fn open(path: &Path) -> Result<Pages> {
             "check the path and its permissions",
         )
     };
-    let file = File::open(path).map_err(unreadable)?;
+    let mut file = File::open(path).map_err(unreadable)?;
     let file_bytes = file.metadata().map_err(unreadable)?.len();
-    if let Some(fault) = directories::fault(&file) {
+    let mut source: Box<dyn Source> = if file_bytes <= AT_ONCE {
+        let mut bytes = Vec::with_capacity(file_bytes as usize);
+        file.read_to_end(&mut bytes).map_err(unreadable)?;
+        Box::new(Cursor::new(bytes))
+    } else {
+        Box::new(BufReader::new(file))
+    };
+    if let Some(fault) = directories::fault(&mut source, file_bytes) {
         return Err(Error::file(
             path,
             format!("is no sound TIFF file: {fault}"),
             DAMAGED,
         ));
     }
-    let mut file = file;
-    file.rewind().map_err(unreadable)?;
+    source.rewind().map_err(unreadable)?;
     let mut limits = Limits::default();
     limits.decoding_buffer_size = PAGE_BYTES as usize;
     limits.intermediate_buffer_size = PAGE_BYTES as usize;
-    let decoder = Decoder::new(BufReader::new(file))
+    let decoder = Decoder::new(source)
         .map_err(|e| damaged(path, &e))?
         .with_limits(limits);
     Ok(Pages {
@@ -59,97 +79,225 @@ fn open(path: &Path) -> Result<Pages> {
 }
 
 fn damaged(path: &Path, e: &tiff::TiffError) -> Error {
-    Error::file(path, format!("cannot be decoded as TIFF ({e})"), DAMAGED)
+    match e {
+        tiff::TiffError::UnsupportedError(e) => unread(
+            path,
+            &format!("is stored in a way that is not read ({e})"),
+            "export it again as plain grey-value TIFF",
+        ),
+        e => Error::file(path, format!("cannot be decoded as TIFF ({e})"), DAMAGED),
+    }
+}
+
+/// A sound file of a kind that is not read.
+fn unread(path: &Path, found: &str, advice: &str) -> Error {
+    Error::file(path, found, format!("the file is sound: {advice}"))
 }
 
 /// Reads a file of one page.
 pub fn read_slice(path: &Path) -> Result<Slice> {
     let mut pages = open(path)?;
-    let mut slice = page(&mut pages, path)?;
-    slice.grey = imagej(&description(&mut pages.decoder)).grey;
-    slice.grey.apply(&mut slice.values, slice.stored_as);
-    if pages.decoder.more_images() {
+    let described = described(&mut pages, path)?;
+    refuse_described(&described, path)?;
+    let mut page = page(&mut pages, path, described.is_imagej())?;
+    if more(&mut pages, path)? {
         return Err(Error::file(
             path,
             "holds several pages in a folder of slices",
             "a multi-page TIFF is a scan of its own: give the file, or keep only single slices in the folder",
         ));
     }
-    Ok(slice)
+    let stored_as = page.storage.stored_as();
+    let mut grey = grey_of(&described);
+    grey.apply(&mut page.values, &stored_as);
+    let size = described.size(page.resolution, 1);
+    let mut notes = page.storage.notes();
+    notes.extend(size.notes);
+    Ok(Slice {
+        width: page.storage.width,
+        height: page.storage.height,
+        values: page.values,
+        stored_as,
+        pixel_mm: size.pixel_mm,
+        slice_mm: size.slice_mm,
+        grey,
+        notes,
+    })
 }
 
 /// Reads a stack in one file.
 pub fn read(path: &Path) -> Result<Stored> {
     let mut pages = open(path)?;
-    let mut facts = imagej(&description(&mut pages.decoder));
-    let first = page(&mut pages, path)?;
-    let (nx, ny) = (first.width, first.height);
-    let mut notes = Vec::new();
-    let spacing_mm = stored::spacing(&first, &mut notes);
-    let stored_as = first.stored_as;
+    let described = described(&mut pages, path)?;
+    refuse_described(&described, path)?;
+    let mut left_out = skip_reduced(&mut pages, path)?;
+    let first = page(&mut pages, path, described.is_imagej())?;
+    let (nx, ny) = (first.storage.width, first.storage.height);
+    let mut notes = first.storage.notes();
     let mut values = first.values;
     let mut nz = 1;
-    if !pages.decoder.more_images() && facts.images > 1 {
-        nz = facts.images;
-        values = contiguous(&mut pages, path, [nx, ny, nz])?;
+    let behind = described.slices_of_one_page([nx, ny]);
+    if behind > 1 && !pages.decoder.more_images() {
+        nz = behind;
+        values = contiguous(&mut pages, path, &first.storage, nz)?;
     }
-    while pages.decoder.more_images() {
-        pages.decoder.next_image().map_err(|e| damaged(path, &e))?;
-        let next = page(&mut pages, path)?;
-        nz += 1;
-        if (next.width, next.height) != (nx, ny) {
-            return Err(Error::file(
-                path,
-                format!(
-                    "page {nz} has {} × {} pixels, the first has {nx} × {ny}",
-                    next.width, next.height
-                ),
-                "one scan has pages of one size: export the stack again without thumbnails or other resolutions",
-            ));
+    loop {
+        let [next, reduced] = next(&mut pages, path)?;
+        left_out += reduced;
+        if next == 0 {
+            break;
         }
-        values.extend_from_slice(&next.values);
+        let other = page(&mut pages, path, described.is_imagej())?;
+        nz += 1;
+        same_kind(&first.storage, &other.storage, nz, path)?;
+        values.extend_from_slice(&other.values);
     }
-    if facts.channels > 1 || facts.frames > 1 {
-        return Err(Error::file(
-            path,
-            format!(
-                "is an ImageJ hyperstack of {} channels and {} frames",
-                facts.channels, facts.frames
-            ),
-            "save the one channel and frame that holds the scan",
+    if left_out > 0 {
+        notes.push(format!(
+            "{left_out} pages are of another resolution, or masks (tag NewSubfileType): they were left out"
         ));
     }
-    facts.grey.apply(&mut values, stored_as);
-    notes.extend(facts.grey.notes());
+    let mut values = in_order(&described, values, [nx, ny, nz], path)?;
+    let mut grey = grey_of(&described);
+    grey.apply(&mut values, &first.storage.stored_as());
+    let size = described.size(first.resolution, nz);
+    notes.extend(size.notes);
+    let spacing_mm = stored::spacing(size.pixel_mm, size.slice_mm, nz, &mut notes);
+    notes.extend(grey.notes());
     Ok(Stored {
-        format: format!("TIFF stack, {stored_as}"),
+        format: format!("TIFF stack, {}", first.storage.stored_as()),
         n: [nx, ny, nz],
         values,
         spacing_mm,
-        unit: facts.grey.unit(),
+        unit: grey.unit(),
         notes,
         ..Stored::default()
     })
 }
 
-/// Decodes the current page.
-fn page(pages: &mut Pages, path: &Path) -> Result<Slice> {
-    let d = &mut pages.decoder;
-    let (width, height) = d.dimensions().map_err(|e| damaged(path, &e))?;
-    let bits = match d.colortype().map_err(|e| damaged(path, &e))? {
-        ColorType::Gray(bits) => bits,
-        other => {
-            return Err(Error::file(
-                path,
-                format!("is a colour image ({other:?}), grey values are expected"),
-                "convert it to 8- or 16-bit grey values (in Fiji: Image > Type)",
-            ));
+fn grey_of(described: &Described) -> Grey {
+    match described {
+        Described::ImageJ(facts) => facts.grey,
+        _ => Grey::default(),
+    }
+}
+
+fn refuse_described(described: &Described, path: &Path) -> Result<()> {
+    match described.fault() {
+        Some(fault) => Err(Error::file(
+            path,
+            fault,
+            "save the one channel and time that holds the scan as a stack (in Fiji: Image > Duplicate, or Image > Color > Split Channels)",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Passes over pages of other resolutions: how many.
+fn skip_reduced(pages: &mut Pages, path: &Path) -> Result<usize> {
+    let mut skipped = 0;
+    while storage::is_reduced(pages) && pages.decoder.more_images() {
+        pages.decoder.next_image().map_err(|e| damaged(path, &e))?;
+        skipped += 1;
+    }
+    Ok(skipped)
+}
+
+/// Goes to the next page of full resolution: 1 if there is one, and how many others were passed over.
+fn next(pages: &mut Pages, path: &Path) -> Result<[usize; 2]> {
+    let mut skipped = 0;
+    while pages.decoder.more_images() {
+        pages.decoder.next_image().map_err(|e| damaged(path, &e))?;
+        if !storage::is_reduced(pages) {
+            return Ok([1, skipped]);
         }
+        skipped += 1;
+    }
+    Ok([0, skipped])
+}
+
+fn more(pages: &mut Pages, path: &Path) -> Result<bool> {
+    Ok(next(pages, path)?[0] > 0)
+}
+
+fn same_kind(first: &Storage, other: &Storage, number: usize, path: &Path) -> Result<()> {
+    let wrong = |found: String| {
+        Err(Error::file(
+            path,
+            found,
+            "one scan has pages of one size and kind: export the stack again without thumbnails or other images",
+        ))
     };
-    let pixels = u64::from(width) * u64::from(height);
-    let bytes = (pixels * u64::from(bits)).div_ceil(8);
+    let [(nx, ny), (mx, my)] = [first, other].map(|s| (s.width, s.height));
+    if (nx, ny) != (mx, my) {
+        return wrong(format!(
+            "page {number} has {mx} × {my} pixels, the first has {nx} × {ny}"
+        ));
+    }
+    if !first.is_like(other) {
+        return wrong(format!(
+            "page {number} holds {}, the first {}",
+            other.words(),
+            first.words()
+        ));
+    }
+    Ok(())
+}
+
+/// Slices in the order that the description gives them.
+fn in_order(
+    described: &Described,
+    values: Vec<f32>,
+    [nx, ny, nz]: [usize; 3],
+    path: &Path,
+) -> Result<Vec<f32>> {
+    let export = "the file is truncated, or pages were added to it: export it again";
+    if let Some(said) = described.slices()
+        && said != nz
+    {
+        return Err(Error::file(
+            path,
+            format!("says that it holds {said} slices, and holds {nz} pages"),
+            export,
+        ));
+    }
+    let Described::Ome(ome) = described else {
+        return Ok(values);
+    };
+    if ome.contradicts([nx, ny]) {
+        let [x, y, ..] = ome.sizes;
+        let found = format!("its OME-XML says {x} × {y} pixels, its pages have {nx} × {ny}");
+        return Err(Error::file(path, found, export));
+    }
+    let plane = nx * ny;
+    let order = ome
+        .pages_of(nz)
+        .map_err(|found| Error::file(path, found, export))?;
+    if order.iter().copied().eq(0..nz) {
+        return Ok(values);
+    }
+    let pages = order
+        .into_iter()
+        .flat_map(|k| &values[k * plane..(k + 1) * plane]);
+    Ok(pages.copied().collect())
+}
+
+struct Page {
+    storage: Storage,
+    values: Vec<f32>,
+    resolution: scale::Resolution,
+}
+
+/// Decodes the current page.
+fn page(pages: &mut Pages, path: &Path, from_imagej: bool) -> Result<Page> {
+    let storage = storage(pages, path, from_imagej)?;
+    let (width, height) = (storage.width, storage.height);
+    let bits = (storage.samples.bits * storage.samples.count) as u64;
+    let bytes = (width as u64 * height as u64)
+        .saturating_mul(bits)
+        .div_ceil(8);
     // No compression here shrinks more than about 2000 : 1.
-    if pixels == 0 || bytes > pages.file_bytes.saturating_mul(2000) + 4096 || bytes > PAGE_BYTES {
+    if bytes > pages.file_bytes.saturating_mul(2000) + 4096 || bytes > PAGE_BYTES {
         return Err(Error::file(
             path,
             format!(
@@ -159,10 +307,11 @@ fn page(pages: &mut Pages, path: &Path) -> Result<Slice> {
             DAMAGED,
         ));
     }
-    let (pixel_mm, slice_mm) = resolution(d);
-    let decoded = d.read_image().map_err(|e| damaged(path, &e))?;
-    let (width, height) = (width as usize, height as usize);
-    let (values, stored_as) = grey(decoded, bits, width, height);
+    let resolution = scale::resolution(pages, from_imagej);
+    let values = match storage.by_crate() {
+        true => by_crate(pages, path, &storage)?,
+        false => by_chunks(pages, path, &storage)?,
+    };
     if values.len() != width * height {
         return Err(Error::file(
             path,
@@ -173,89 +322,76 @@ fn page(pages: &mut Pages, path: &Path) -> Result<Slice> {
             DAMAGED,
         ));
     }
-    Ok(Slice {
-        width,
-        height,
+    Ok(Page {
+        storage,
         values,
-        stored_as,
-        pixel_mm,
-        slice_mm,
-        grey: Grey::default(),
+        resolution,
     })
 }
 
-fn grey(
-    decoded: DecodingResult,
-    bits: u8,
-    width: usize,
-    height: usize,
-) -> (Vec<f32>, &'static str) {
-    fn cast<T: Copy>(v: &[T], f: impl Fn(T) -> f32) -> Vec<f32> {
-        v.iter().map(|&x| f(x)).collect()
-    }
-    match decoded {
-        DecodingResult::U8(v) if bits < 8 => (unpacked(&v, bits, width, height), "packed bits"),
-        DecodingResult::U8(v) => (cast(&v, f32::from), "uint8"),
-        DecodingResult::I8(v) => (cast(&v, f32::from), "int8"),
-        DecodingResult::U16(v) => (cast(&v, f32::from), "uint16"),
-        DecodingResult::I16(v) => (cast(&v, f32::from), "int16"),
-        DecodingResult::U32(v) => (cast(&v, |x| x as f32), "uint32"),
-        DecodingResult::I32(v) => (cast(&v, |x| x as f32), "int32"),
-        DecodingResult::U64(v) => (cast(&v, |x| x as f32), "uint64"),
-        DecodingResult::I64(v) => (cast(&v, |x| x as f32), "int64"),
-        DecodingResult::F16(v) => (cast(&v, |x| x.to_f32()), "float16"),
-        DecodingResult::F32(v) => (v, "float32"),
-        DecodingResult::F64(v) => (cast(&v, |x| x as f32), "float64"),
-    }
+fn by_chunks(pages: &mut Pages, path: &Path, storage: &Storage) -> Result<Vec<f32>> {
+    let [offsets, bytes] = match pages.decoder.get_chunk_type() {
+        tiff::decoder::ChunkType::Strip => [Tag::StripOffsets, Tag::StripByteCounts],
+        tiff::decoder::ChunkType::Tile => [Tag::TileOffsets, Tag::TileByteCounts],
+    };
+    let [offsets, bytes] = [offsets, bytes].map(|tag| numbers(pages, tag).unwrap_or_default());
+    let places = Places { offsets, bytes };
+    chunks::values(storage, &places, pages.decoder.inner()).map_err(|fault| match fault {
+        Fault::Damaged(found) => Error::file(
+            path,
+            format!("cannot be decoded as TIFF ({found})"),
+            DAMAGED,
+        ),
+        Fault::NotGrey(found) => unread(
+            path,
+            found,
+            "convert it to 8- or 16-bit grey values (in Fiji: Image > Type)",
+        ),
+    })
 }
 
-/// Pages of 1, 2 or 4 bits come packed, each row from a byte of its own, first pixel in the high bits.
-fn unpacked(bytes: &[u8], bits: u8, width: usize, height: usize) -> Vec<f32> {
-    let row_bytes = (width * bits as usize).div_ceil(8);
-    let mask = (1u16 << bits) as u8 - 1;
-    bytes
-        .chunks_exact(row_bytes)
-        .take(height)
-        .flat_map(|row| {
-            (0..width).map(move |x| {
-                let at = x * bits as usize;
-                f32::from(row[at / 8] >> (8 - bits as usize - at % 8) & mask)
-            })
-        })
-        .collect()
+/// Compressions that the crate decodes: fax of 1 bit, JPEG of 8 bits.
+fn by_crate(pages: &mut Pages, path: &Path, storage: &Storage) -> Result<Vec<f32>> {
+    let decoded = pages.decoder.read_image().map_err(|e| damaged(path, &e))?;
+    let DecodingResult::U8(mut bytes) = decoded else {
+        return Err(unread(
+            path,
+            "is JPEG of more than 8 bits, which is not read",
+            "save it uncompressed",
+        ));
+    };
+    if storage.white_is_zero {
+        // The crate inverts such pages.
+        bytes.iter_mut().for_each(|b| *b = !*b);
+    }
+    let mut values = Vec::new();
+    storage.samples.decode(&bytes, storage.width, &mut values);
+    Ok(values)
 }
 
-/// ImageJ writes stacks over 4 GiB (and, on request, any) as one page followed by the planes of all the others.
-fn contiguous(pages: &mut Pages, path: &Path, n: [usize; 3]) -> Result<Vec<f32>> {
-    let d = &mut pages.decoder;
-    let tag = |d: &mut Decoder<BufReader<File>>, t: Tag| {
-        d.get_tag_u64_vec(t).map_err(|e| damaged(path, &e))
+/// ImageJ writes stacks over 4 GiB (and tifffile, on request, any) as one page followed by the planes of all the others.
+fn contiguous(pages: &mut Pages, path: &Path, storage: &Storage, nz: usize) -> Result<Vec<f32>> {
+    let Samples {
+        big_endian, count, ..
+    } = storage.samples;
+    let plain = storage.compression == codec::NONE
+        && count == 1
+        && !storage.reversed_bits
+        && storage.chunk[0] == storage.width;
+    let offsets = numbers(pages, Tag::StripOffsets).unwrap_or_default();
+    let (Some(scalar), true, Some(&offset)) = (storage.samples.scalar(), plain, offsets.first())
+    else {
+        return Err(rare_stack(path, nz));
     };
-    let plain = d.get_tag_u32(Tag::Compression).unwrap_or(1) == 1;
-    let offset = tag(d, Tag::StripOffsets)?.first().copied().unwrap_or(0);
-    let bits = tag(d, Tag::BitsPerSample)?.first().copied().unwrap_or(0);
-    let format = d.get_tag_u32(Tag::SampleFormat).unwrap_or(1);
-    let scalar = match (bits, format) {
-        (8, 1) => Scalar::U8,
-        (16, 1) => Scalar::U16,
-        (16, 2) => Scalar::I16,
-        (32, 1) => Scalar::U32,
-        (32, 3) => Scalar::F32,
-        _ => return Err(rare_stack(path, n[2])),
-    };
-    if !plain {
-        return Err(rare_stack(path, n[2]));
-    }
-    let big_endian = d.byte_order() == tiff::tags::ByteOrder::BigEndian;
     let layout = Layout {
         scalar,
         big_endian,
-        n,
+        n: [storage.width, storage.height, nz],
         slope: 1.0,
         intercept: 0.0,
     };
     let left = pages.file_bytes.saturating_sub(offset);
-    let source = d.inner();
+    let source = pages.decoder.inner();
     source
         .seek(SeekFrom::Start(offset))
         .map_err(|e| Error::file(path, format!("cannot be read: {e}"), DAMAGED))?;
@@ -266,7 +402,7 @@ fn rare_stack(path: &Path, images: usize) -> Error {
     Error::file(
         path,
         format!(
-            "says it is an ImageJ stack of {images} slices, but holds one page and no plain planes after it"
+            "says that it is a stack of {images} slices, but holds one page and no plain planes after it"
         ),
         "export it again as an uncompressed TIFF stack",
     )
@@ -307,83 +443,6 @@ pub fn write_slices(folder: &Path, name: &str, volume: &Volume<i16>) -> Result<(
         crate::io::atomic::write(&path, bytes.into_inner())?;
     }
     Ok(())
-}
-
-fn description(d: &mut Decoder<BufReader<File>>) -> String {
-    // µ may be Latin-1, which is not UTF-8: read bytes, not a string.
-    match d.find_tag(Tag::ImageDescription) {
-        Ok(Some(value)) => match value {
-            tiff::decoder::ifd::Value::Ascii(text) => text,
-            other => other
-                .into_u8_vec()
-                .map(|b| b.iter().map(|&c| char::from(c)).collect())
-                .unwrap_or_default(),
-        },
-        _ => String::new(),
-    }
-}
-
-/// Pixel size and slice distance in mm, from ImageJ's notes, OME's, or resolution tags that are no printer's.
-fn resolution(d: &mut Decoder<BufReader<File>>) -> (Option<[f64; 2]>, Option<f64>) {
-    let text = description(d);
-    if text.contains("<OME") {
-        return ome(&text);
-    }
-    let (Some(x), Some(y)) = (per_unit(d, Tag::XResolution), per_unit(d, Tag::YResolution)) else {
-        return (None, None);
-    };
-    if text.starts_with("ImageJ=") {
-        let facts = imagej(&text);
-        let unit = facts.unit_mm;
-        return (
-            unit.map(|u| [u / x, u / y]),
-            unit.zip(facts.spacing).map(|(u, s)| u * s),
-        );
-    }
-    let unit = match d.get_tag_u32(Tag::ResolutionUnit).unwrap_or(2) {
-        2 if !PRINTING_DPI.contains(&x) => 25.4,
-        3 if x > 50.0 => 10.0,
-        _ => return (None, None),
-    };
-    // Rational tags carry rounding: whole nanometres.
-    let pixel = |per_unit: f64| (unit / per_unit * 1e6).round() / 1e6;
-    (Some([pixel(x), pixel(y)]), None)
-}
-
-/// Dots per inch that image programs write when nobody told them a size.
-const PRINTING_DPI: [f64; 9] = [1.0, 72.0, 96.0, 100.0, 150.0, 200.0, 300.0, 600.0, 1200.0];
-
-fn per_unit(d: &mut Decoder<BufReader<File>>, tag: Tag) -> Option<f64> {
-    use tiff::decoder::ifd::Value;
-    let value = match d.find_tag(tag).ok()?? {
-        Value::Rational(a, b) => f64::from(a) / f64::from(b),
-        Value::List(list) => match list.first()? {
-            Value::Rational(a, b) => f64::from(*a) / f64::from(*b),
-            _ => return None,
-        },
-        Value::Float(v) => f64::from(v),
-        Value::Double(v) => v,
-        _ => return None,
-    };
-    (value.is_finite() && value > 0.0).then_some(value)
-}
-
-/// `PhysicalSizeX` and its kin of an OME-XML description; the unit is µm unless said.
-fn ome(xml: &str) -> (Option<[f64; 2]>, Option<f64>) {
-    let attribute = |name: &str| {
-        let start = xml.find(&format!(" {name}=\""))? + name.len() + 3;
-        let text = &xml[start..];
-        Some(&text[..text.find('"')?])
-    };
-    let size = |axis: &str| {
-        let value: f64 = attribute(&format!("PhysicalSize{axis}"))?.parse().ok()?;
-        let unit = match attribute(&format!("PhysicalSize{axis}Unit")) {
-            Some(unit) => unit_mm(unit)?,
-            None => 1e-3,
-        };
-        (value.is_finite() && value > 0.0).then_some(value * unit)
-    };
-    (size("X").zip(size("Y")).map(|(x, y)| [x, y]), size("Z"))
 }
 
 #[cfg(test)]
@@ -498,24 +557,6 @@ mod tests {
                 .zip(volume.as_slice())
                 .all(|(&a, &b)| a == f32::from(b))
         );
-    }
-
-    #[test]
-    fn packed_bits_are_unpacked_row_by_row() {
-        assert_eq!(
-            unpacked(&[0b1010_0000, 0b0100_0000], 1, 3, 2),
-            [1.0, 0.0, 1.0, 0.0, 1.0, 0.0]
-        );
-        assert_eq!(unpacked(&[0x1F], 4, 2, 1), [1.0, 15.0]);
-    }
-
-    #[test]
-    fn ome_sizes_are_read() {
-        let (xy, z) = ome(
-            r#"<OME><Pixels PhysicalSizeX="19.5" PhysicalSizeY="19.5" PhysicalSizeZ="0.02" PhysicalSizeZUnit="mm"/>"#,
-        );
-        let xy = xy.unwrap();
-        assert!((xy[0] - 0.0195).abs() < 1e-12 && z == Some(0.02));
     }
 
     #[test]

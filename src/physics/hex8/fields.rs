@@ -49,8 +49,7 @@ pub fn sample(
     let segment = |s: &Segment| -> Vec<Brick> {
         let mut found = Vec::new();
         for (i, node) in s.nodes().enumerate() {
-            // Bit 7: the element towards larger x, y, z.
-            if mesh.around[node] & 0x80 == 0 {
+            if !mesh.has_element(node) {
                 continue;
             }
             let (factor, kind) = stiffness(node);

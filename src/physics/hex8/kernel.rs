@@ -8,9 +8,9 @@
 //! after the other in memory. Traffic: 3 scalars read, 3 written, 1 byte for the elements around and a share of a segment; the
 //! stencils in use stay in the first two caches.
 
-mod graded;
+mod heterogeneous;
 
-pub use graded::{Elements, graded_f32, graded_f64, low_corner};
+pub use heterogeneous::{Elements, heterogeneous_f32, heterogeneous_f64, low_corner};
 
 use super::stencils::{NINTH, STRIDE, Stencils};
 use crate::discretisation::voxels::VoxelMesh;
@@ -140,6 +140,7 @@ pub type Rows<S> = fn(&VoxelMesh, &Stencils<S>, Range<usize>, &[[S; 3]], &mut [[
 /// `rows[4] + i < x.len() − 1`.
 #[inline(always)]
 unsafe fn own<L: Lanes>(rows: &[u32; 9], i: usize, x: &[[L::S; 3]]) -> (L, L::Four) {
+    // SAFETY: four scalars from the node's first on lie within `x`, since a node follows.
     unsafe {
         let own = x.as_ptr().add(rows[4] as usize + i).cast::<L::S>();
         (L::load_threes(own), L::splat4(*own.add(2)))
@@ -155,6 +156,7 @@ pub unsafe fn node<L: Lanes>(
     i: usize,
     x: &[[L::S; 3]],
 ) -> [L::S; 3] {
+    // SAFETY: nine scalars from node `rows[r] + i − 1` on lie within `x`, by the caller's promise; stencils are of fixed size.
     unsafe {
         let (here, last) = own::<L>(rows, i, x);
         let (mut a, mut b, mut c, mut four) = (L::zero(), L::zero(), L::zero(), L::zero4());
@@ -187,6 +189,7 @@ unsafe fn two_nodes<L: Lanes>(
     i: usize,
     x: &[[L::S; 3]],
 ) -> [[L::S; 3]; 2] {
+    // SAFETY: as in [`node`], for both nodes.
     unsafe {
         let (here_0, last_0) = own::<L>(rows, i, x);
         let (here_1, last_1) = own::<L>(rows, i + 1, x);

@@ -5,7 +5,7 @@
 
 pub mod element;
 pub mod fields;
-pub mod graded;
+pub mod heterogeneous;
 mod kernel;
 mod stencils;
 
@@ -13,7 +13,7 @@ use crate::discretisation::voxels::VoxelMesh;
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::par;
-use element::Integration;
+use element::{ElementMatrix, Integration};
 use rayon::prelude::*;
 use std::ops::Range;
 use stencils::{Couplings, Stencils};
@@ -32,12 +32,17 @@ impl Hex8 {
     /// `young_mpa` in MPa, `−1 < poisson < ½`.
     pub fn new(mesh: VoxelMesh, young_mpa: f64, poisson: f64, rule: Integration) -> Self {
         let k = element::stiffness(mesh.grid.spacing_mm, young_mpa, poisson, rule);
-        let double = Stencils::new(&k);
+        Hex8::of_matrix(mesh, &k)
+    }
+
+    /// Elements that all have the stiffness matrix `k`, in N/mm.
+    pub fn of_matrix(mesh: VoxelMesh, k: &ElementMatrix) -> Self {
+        let double = Stencils::new(k);
         Hex8 {
             mesh,
             single: double.to_f32(),
             couplings: Couplings::new(&double),
-            eigenvalue_bound: element::eigenvalue_bound(&k),
+            eigenvalue_bound: element::eigenvalue_bound(k),
             double,
         }
     }
@@ -164,8 +169,8 @@ mod tests {
     }
 
     #[test]
-    fn forces_of_graded_elements_are_those_of_each_times_its_factor() {
-        let op = graded([11, 7, 6], 2);
+    fn forces_of_heterogeneous_elements_are_those_of_each_times_its_factor() {
+        let op = heterogeneous([11, 7, 6], 2);
         let x = vector(op.sites());
         let exact = by_elements(op.mesh(), &x, factor);
         let scale = exact.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
@@ -188,7 +193,9 @@ mod tests {
         let mesh = random([11, 7, 6], 50, 5).mesh;
         let x = vector(mesh.len());
         let mixed =
-            graded::Graded::of_kinds(mesh.clone(), 1000.0, &kinds, factor, |e| second(e).into());
+            heterogeneous::Heterogeneous::of_kinds(mesh.clone(), 1000.0, &kinds, factor, |e| {
+                second(e).into()
+            });
         check_rows(&mixed);
         let mut exact = vec![[0.0; 3]; x.len()];
         for (kind, &(nu, rule)) in kinds.iter().enumerate() {
@@ -199,7 +206,7 @@ mod tests {
                     0.0
                 }
             };
-            let part = graded::Graded::new(mesh.clone(), 1000.0, nu, rule, own);
+            let part = heterogeneous::Heterogeneous::new(mesh.clone(), 1000.0, nu, rule, own);
             let mut y = vec![[0.0; 3]; x.len()];
             part.apply(&x, &mut y);
             for (sum, y) in exact.iter_mut().zip(&y) {
@@ -220,7 +227,7 @@ mod tests {
         let mut y = x(op.sites());
         op.rows_f32(0..y.len(), &x(op.sites()), &mut y);
         assert!(y.iter().flatten().all(|f| *f == 0.0));
-        let op = graded([11, 7, 6], 2);
+        let op = heterogeneous([11, 7, 6], 2);
         let mut y = x(op.sites());
         op.rows_f32(0..y.len(), &x(op.sites()), &mut y);
         assert!(y.iter().flatten().all(|f| *f == 0.0));
@@ -230,13 +237,13 @@ mod tests {
     fn rows_are_what_the_operator_applies() {
         let op = random([9, 6, 5], 50, 3);
         check_rows(&op);
-        check_rows(&graded([9, 6, 5], 3));
+        check_rows(&heterogeneous([9, 6, 5], 3));
     }
 
     /// Factors that differ from element to element.
-    fn graded(n: [usize; 3], seed: u64) -> graded::Graded {
+    fn heterogeneous(n: [usize; 3], seed: u64) -> heterogeneous::Heterogeneous {
         let mesh = random(n, 50, seed).mesh;
-        graded::Graded::new(mesh, 1000.0, 0.3, Integration::Full, factor)
+        heterogeneous::Heterogeneous::new(mesh, 1000.0, 0.3, Integration::Full, factor)
     }
 
     fn factor(element: usize) -> f32 {

@@ -1,4 +1,4 @@
-//! Owns the graded lattice: the lattice element with a share of a whole bond's stiffness on each bond.
+//! Owns the lattice of connected components: the lattice element with a share of a whole bond's stiffness on each bond.
 //!
 //! `U = Σ_i [ ½ Σ_s k_s Σ_j σ_ij dl_ij² + ½ T Σ_s (N_s / Σ_j σ_ij) (Σ_j σ_ij dl_ij)² ]` with shares `σ` and `N_s` bonds
 //! of a whole site in shell `s`. Where all shares are 1 this is the uniform lattice, and by Cauchy and Schwarz it is never
@@ -28,18 +28,18 @@ struct Direction {
     half: f64,
 }
 
-/// The linearised graded lattice as an operator: `K u` is the gradient of the energy. N and mm.
-pub struct ConnectedLattice<'a> {
-    pieces: &'a ConnectedSites,
+/// The linearised lattice of connected components as an operator: `K u` is the gradient of the energy. N and mm.
+pub struct ConnectedLattice {
+    pub sites: ConnectedSites,
     moduli: Moduli,
     directions: Vec<Direction>,
     /// `T N_s / Σ σ` of each site and shell; empty at ν = ¼, where no volumetric pass is made.
     volumetric: Vec<[f64; 2]>,
 }
 
-impl<'a> ConnectedLattice<'a> {
-    pub fn new(pieces: &'a ConnectedSites, moduli: Moduli) -> Self {
-        let stencil = pieces.frame.structure.stencil();
+impl ConnectedLattice {
+    pub fn new(sites: ConnectedSites, moduli: Moduli) -> Self {
+        let stencil = sites.frame.structure.stencil();
         let direction = |b: usize| {
             let d = stencil.direction(b).map(f64::from);
             let squared: f64 = d.iter().map(|c| c * c).sum();
@@ -58,7 +58,7 @@ impl<'a> ConnectedLattice<'a> {
         directions.iter().for_each(|d| whole[d.shell] += 1.0);
         let coefficients = |site: usize| {
             let mut shares = [0.0; 2];
-            for (_, b, share) in pieces.bonds.of(site) {
+            for (_, b, share) in sites.bonds.of(site) {
                 shares[directions[b].shell] += f64::from(share);
             }
             let of = |s: usize| {
@@ -70,10 +70,10 @@ impl<'a> ConnectedLattice<'a> {
             };
             [of(0), of(1)]
         };
-        let sites = if moduli.t == 0.0 { 0 } else { pieces.len() };
+        let count = if moduli.t == 0.0 { 0 } else { sites.len() };
         ConnectedLattice {
-            volumetric: (0..sites).into_par_iter().map(coefficients).collect(),
-            pieces,
+            volumetric: (0..count).into_par_iter().map(coefficients).collect(),
+            sites,
             moduli,
             directions,
         }
@@ -86,7 +86,7 @@ impl<'a> ConnectedLattice<'a> {
         u: &'b [[S; 3]],
         site: usize,
     ) -> impl Iterator<Item = (usize, &'b Direction, f64, f64)> + 'b {
-        self.pieces.bonds.of(site).map(move |(end, b, share)| {
+        self.sites.bonds.of(site).map(move |(end, b, share)| {
             let d = &self.directions[b];
             let along = super::along(d.d, u[end], u[site]);
             (end, d, f64::from(share), d.half * along)
@@ -116,14 +116,14 @@ impl<'a> ConnectedLattice<'a> {
 
     /// Elastic energy in N mm.
     pub fn energy(&self, u: &[[f64; 3]]) -> f64 {
-        crate::par::sum_chunks(self.pieces.len(), |sites| {
+        crate::par::sum_chunks(self.sites.len(), |sites| {
             sites.map(|s| self.site_energy(u, s)).sum()
         })
     }
 
     /// Of every site, what a volumetric pass gives; none at ν = ¼.
     fn all_pressures<S: Copy + Into<f64> + Sync>(&self, u: &[[S; 3]]) -> Vec<[f64; 2]> {
-        assert_eq!(u.len(), self.pieces.len());
+        assert_eq!(u.len(), self.sites.len());
         (0..self.volumetric.len())
             .into_par_iter()
             .with_min_len(PORTION)
@@ -150,7 +150,7 @@ impl<'a> ConnectedLattice<'a> {
     }
 }
 
-impl Virial for ConnectedLattice<'_> {
+impl Virial for ConnectedLattice {
     fn virial<S: Copy + Into<f64>>(
         &self,
         u: &[[S; 3]],
@@ -162,10 +162,10 @@ impl Virial for ConnectedLattice<'_> {
     }
 }
 
-impl ConnectedLattice<'_> {
+impl ConnectedLattice {
     fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize) -> f64 {
-        let (axis, grips) = (self.pieces.frame.axis.index(), self.pieces.grips);
-        let plane = self.pieces.indices[site][axis];
+        let (axis, grips) = (self.sites.frame.axis.index(), self.sites.grips);
+        let plane = self.sites.indices[site][axis];
         let pressures = if self.volumetric.is_empty() {
             [0.0; 2]
         } else {
@@ -177,7 +177,7 @@ impl ConnectedLattice<'_> {
             if inside <= 0 {
                 return 0.0;
             }
-            let lever = d.half * d.d[axis] * d.d[axis] * self.pieces.frame.step_mm;
+            let lever = d.half * d.d[axis] * d.d[axis] * self.sites.frame.step_mm;
             let inside = f64::from(inside) / d.d[axis].abs();
             inside * lever * share * (self.moduli.k[d.shell] * dl + pressures[d.shell])
         };
@@ -185,9 +185,9 @@ impl ConnectedLattice<'_> {
     }
 }
 
-impl Operator<3> for ConnectedLattice<'_> {
+impl Operator<3> for ConnectedLattice {
     fn sites(&self) -> usize {
-        self.pieces.len()
+        self.sites.len()
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
@@ -201,7 +201,7 @@ impl Operator<3> for ConnectedLattice<'_> {
     fn diagonal(&self, d: &mut [[f64; 3]]) {
         d.par_iter_mut().enumerate().for_each(|(site, d)| {
             let (mut own, mut gradient) = ([0.0; 3], [[0.0; 3]; 2]);
-            for (end, b, share) in self.pieces.bonds.of(site) {
+            for (end, b, share) in self.sites.bonds.of(site) {
                 let (share, b) = (f64::from(share), &self.directions[b]);
                 let there = self.volumetric.get(end).map_or(0.0, |t| t[b.shell]);
                 for c in 0..3 {
@@ -219,7 +219,7 @@ impl Operator<3> for ConnectedLattice<'_> {
     }
 }
 
-impl MixedPrecision for ConnectedLattice<'_> {
+impl MixedPrecision for ConnectedLattice {
     fn apply_single(
         &self,
         x: &[[f32; 3]],
@@ -236,28 +236,28 @@ impl MixedPrecision for ConnectedLattice<'_> {
         sum
     }
 
-    fn each_part(
+    fn for_each_chunk(
         &self,
         x: &[[f64; 3]],
         out: &mut [[f32; 3]],
-        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+        consume: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
         let pressures = self.all_pressures(x);
         each_chunk(out, PORTION, |first, out| {
             let sites = first..first + out.len();
             let image: Vec<[f64; 3]> = sites.map(|s| self.row(x, &pressures, s)).collect();
-            take(first, &image, out)
+            consume(first, &image, out)
         })
     }
 }
 
-/// What multigrid sees of a graded lattice: its springs.
-pub struct ConnectedSprings<'a>(pub &'a ConnectedLattice<'a>);
+/// What multigrid sees of a lattice of connected components: its springs.
+pub struct ConnectedSprings<'a>(pub &'a ConnectedLattice);
 
 impl ConnectedSprings<'_> {
     /// Neighbour and spring of each bond of a site.
     fn springs(&self, site: usize) -> impl Iterator<Item = (usize, [f64; 3], f64)> + '_ {
-        let bonds = self.0.pieces.bonds.of(site);
+        let bonds = self.0.sites.bonds.of(site);
         bonds.map(|(end, b, share)| {
             let d = &self.0.directions[b];
             (end, d.d, d.spring * f64::from(share))
@@ -289,7 +289,7 @@ impl Operator<3> for ConnectedSprings<'_> {
 
 impl Coarsen for ConnectedSprings<'_> {
     fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
-        let ConnectedSites { frame, indices, .. } = self.0.pieces;
+        let ConnectedSites { frame, indices, .. } = &self.0.sites;
         for (x, at) in x.iter_mut().zip(&indices[sites]) {
             *x = frame.position_mm(*at);
         }
@@ -338,7 +338,7 @@ impl Coarsen for ConnectedSprings<'_> {
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
         for (site, y) in sites.zip(y) {
             let mut f = [0f32; 3];
-            for (end, b, share) in self.0.pieces.bonds.of(site) {
+            for (end, b, share) in self.0.sites.bonds.of(site) {
                 let [d, pull] = &self.0.directions[b].single;
                 let along: f32 = (0..3).map(|c| d[c] * (x[site][c] - x[end][c])).sum();
                 (0..3).for_each(|c| f[c] += share * along * pull[c]);

@@ -1,7 +1,7 @@
 //! Owns the lattice's inner loops: what one site gathers from its neighbours.
 
 use crate::discretisation::lattice::neighbours::{DECODED, EMPTY, LANES, Neighbours};
-use crate::simd::vec3::{Precision, Quad};
+use crate::simd::vec3::{Precision, Vec3Lanes};
 use std::ops::Range;
 
 /// One opposite pair of bonds, scaled for the kernels.
@@ -78,7 +78,8 @@ fn ends(row: &[u32; LANES], p: usize) -> [u32; 2] {
 /// # Safety
 /// As [`springs`], `j` a site.
 #[inline(always)]
-unsafe fn at<Q: Quad>(u: &[[Q::S; 3]], j: u32) -> Q {
+unsafe fn at<Q: Vec3Lanes>(u: &[[Q::S; 3]], j: u32) -> Q {
+    // SAFETY: `j` is below the length of `u`, and a load reads three scalars.
     unsafe { Q::load(u.as_ptr().add(j as usize).cast()) }
 }
 
@@ -86,16 +87,23 @@ unsafe fn at<Q: Quad>(u: &[[Q::S; 3]], j: u32) -> Q {
 #[derive(Clone, Copy)]
 struct Pull<Q>([Q; 3]);
 
-impl<Q: Quad> Pull<Q> {
+impl<Q: Vec3Lanes> Pull<Q> {
+    /// # Safety
+    /// The instruction set of `Q` is available.
     #[inline(always)]
     unsafe fn zero() -> Self {
+        // SAFETY: the caller vouches for the instruction set.
         Pull(unsafe { [Q::zero(); 3] })
     }
 
     /// Adds `spring · d (d · s)` of pair `p`, with its sign turned.
+    ///
+    /// # Safety
+    /// The instruction set of `Q` is available.
     #[inline(always)]
     unsafe fn add<H: Shape>(&mut self, p: usize, pair: &Pair<Q::S>, s: Q) {
         let [f, g, h] = &mut self.0;
+        // SAFETY: the caller vouches for the instruction set; constants are arrays of four.
         unsafe {
             *f = f.fma(Q::constant(&pair.diagonals[0]), s);
             if !(H::AXIAL..H::AXIAL + 3).contains(&p) {
@@ -105,9 +113,12 @@ impl<Q: Quad> Pull<Q> {
         }
     }
 
+    /// # Safety
+    /// The instruction set of `Q` is available.
     #[inline(always)]
     unsafe fn sum(self) -> Q {
         let [f, g, h] = self.0;
+        // SAFETY: the caller vouches for the instruction set.
         unsafe { f.add(g.turn().add(h.turn_back())) }
     }
 }
@@ -119,7 +130,7 @@ impl<Q: Quad> Pull<Q> {
 /// # Safety
 /// The instruction set of `Q` is available; neighbours are below the number of sites in `u`; `y` has an entry a site.
 #[inline(always)]
-pub unsafe fn springs<H: Shape, Q: Quad>(
+pub unsafe fn springs<H: Shape, Q: Vec3Lanes>(
     bonds: Bonds<Q::S>,
     sites: Range<usize>,
     u: &[[Q::S; 3]],
@@ -130,6 +141,7 @@ pub unsafe fn springs<H: Shape, Q: Quad>(
     for part in decoded(&sites) {
         bonds.neighbours.decode(part.clone(), &mut table);
         for (site, row) in part.zip(&table) {
+            // SAFETY: the caller's promise: the instruction set, and ends of bonds that are sites.
             unsafe {
                 let here = at::<Q>(u, site as u32);
                 let mut pull = Pull::zero();
@@ -144,12 +156,12 @@ pub unsafe fn springs<H: Shape, Q: Quad>(
     }
 }
 
-/// Springs of a graded lattice: bond `ij` is worth `½ (w_i + w_j)`. The diagonals carry the half, too.
+/// Springs of a lattice of weighted sites: bond `ij` is worth `½ (w_i + w_j)`. The diagonals carry the half, too.
 ///
 /// # Safety
 /// As [`springs`]; `weights` has an entry a site.
 #[inline(always)]
-pub unsafe fn graded_springs<H: Shape, Q: Quad>(
+pub unsafe fn weighted_springs<H: Shape, Q: Vec3Lanes>(
     bonds: Bonds<Q::S>,
     weights: &[Q::S],
     sites: Range<usize>,
@@ -161,6 +173,7 @@ pub unsafe fn graded_springs<H: Shape, Q: Quad>(
     for part in decoded(&sites) {
         bonds.neighbours.decode(part.clone(), &mut table);
         for (site, row) in part.zip(&table) {
+            // SAFETY: the caller's promise: the instruction set, and ends of bonds that are sites.
             unsafe {
                 let (here, own) = (at::<Q>(u, site as u32), Q::splat(weights[site]));
                 let mut pull = Pull::zero();
@@ -183,7 +196,7 @@ pub unsafe fn graded_springs<H: Shape, Q: Quad>(
 /// # Safety
 /// As [`springs`]; `theta` has an entry a site.
 #[inline(always)]
-pub unsafe fn springs_and_sums<H: Shape, Q: Quad>(
+pub unsafe fn springs_and_sums<H: Shape, Q: Vec3Lanes>(
     bonds: Bonds<Q::S>,
     sites: Range<usize>,
     u: &[[Q::S; 3]],
@@ -195,6 +208,7 @@ pub unsafe fn springs_and_sums<H: Shape, Q: Quad>(
     for part in decoded(&sites) {
         bonds.neighbours.decode(part.clone(), &mut table);
         for (site, row) in part.zip(&table) {
+            // SAFETY: the caller's promise: the instruction set, and ends of bonds that are sites.
             unsafe {
                 let here = at::<Q>(u, site as u32);
                 let twice = here.add(here);
@@ -216,8 +230,12 @@ pub unsafe fn springs_and_sums<H: Shape, Q: Quad>(
 }
 
 /// A shell's sum with a pair's stretch.
+///
+/// # Safety
+/// The instruction set of `Q` is available.
 #[inline(always)]
-unsafe fn lengthened<Q: Quad>(sum: Q, pair: &Pair<Q::S>, stretch: Q) -> Q {
+unsafe fn lengthened<Q: Vec3Lanes>(sum: Q, pair: &Pair<Q::S>, stretch: Q) -> Q {
+    // SAFETY: the caller vouches for the instruction set; a lever is an array of four.
     unsafe { sum.fma(Q::constant(&pair.lever), stretch) }
 }
 
@@ -226,7 +244,7 @@ unsafe fn lengthened<Q: Quad>(sum: Q, pair: &Pair<Q::S>, stretch: Q) -> Q {
 /// # Safety
 /// As [`springs`]; `theta` has an entry a site.
 #[inline(always)]
-pub unsafe fn volumetric_sums<H: Shape, Q: Quad>(
+pub unsafe fn volumetric_sums<H: Shape, Q: Vec3Lanes>(
     bonds: Bonds<Q::S>,
     sites: Range<usize>,
     u: &[[Q::S; 3]],
@@ -237,6 +255,7 @@ pub unsafe fn volumetric_sums<H: Shape, Q: Quad>(
     for part in decoded(&sites) {
         bonds.neighbours.decode(part.clone(), &mut table);
         for (site, row) in part.zip(&table) {
+            // SAFETY: the caller's promise: the instruction set, and ends of bonds that are sites.
             unsafe {
                 let mut sums = [Q::zero(); 2];
                 for (p, pair) in pairs.iter().enumerate() {
@@ -258,7 +277,7 @@ pub unsafe fn volumetric_sums<H: Shape, Q: Quad>(
 /// # Safety
 /// As [`springs`]; `t` has an entry a site.
 #[inline(always)]
-pub unsafe fn volumetric_forces<H: Shape, Q: Quad>(
+pub unsafe fn volumetric_forces<H: Shape, Q: Vec3Lanes>(
     bonds: Bonds<Q::S>,
     sites: Range<usize>,
     t: &[[Q::S; 2]],
@@ -267,6 +286,7 @@ pub unsafe fn volumetric_forces<H: Shape, Q: Quad>(
     Q::S: Precision,
 {
     let term = |here: Q::S, site: usize, j: u32, shell: usize| {
+        // SAFETY: `j` is the end of a bond, a site, and `t` has an entry a site.
         let there = unsafe { t.get_unchecked(j as usize)[shell] };
         // Selected, not branched on: which neighbours exist follows no pattern.
         std::hint::select_unpredictable(j as usize == site, Q::S::default(), here + there)
@@ -276,6 +296,7 @@ pub unsafe fn volumetric_forces<H: Shape, Q: Quad>(
     for part in decoded(&sites) {
         bonds.neighbours.decode(part.clone(), &mut table);
         for (site, row) in part.zip(&table) {
+            // SAFETY: the caller's promise: the instruction set, and ends of bonds that are sites.
             unsafe {
                 let here = t[site];
                 let y = &mut y[site - sites.start];

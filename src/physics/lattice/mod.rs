@@ -5,7 +5,7 @@
 //!
 //! `U = Σ_i w_i [ ½ Σ_s k_s Σ_{j∈s} dl_ij² + ½ T Σ_s (Σ_{j∈s} dl_ij)² ]`, `dl_ij = ½ n_ij · (u_j − u_i)`,
 //!
-//! with `w_i = 1`, or the bone fraction of the site's cell on graded lattices. Where tissue differs in ν, `w_i T` is each site's own.
+//! with `w_i = 1`, or the bone fraction of the cell of a weighted site. Where tissue differs in ν, `w_i T` is each site's own.
 
 pub mod moduli;
 
@@ -55,27 +55,27 @@ pub trait Virial: Sync {
 }
 
 /// The linearised lattice as an operator: `K u` is the gradient of the energy. N and mm.
-pub struct Lattice<'a> {
-    sites: &'a Sites,
+pub struct Lattice {
+    pub sites: Sites,
     moduli: Moduli,
     pairs: Vec<Pair>,
     double: Scaled<f64>,
     single: Scaled<f32>,
-    room: Mutex<Vec<[f64; 2]>>,
+    scratch: Mutex<Vec<[f64; 2]>>,
 }
 
-impl<'a> Lattice<'a> {
-    pub fn new(sites: &'a Sites, moduli: Moduli) -> Self {
+impl Lattice {
+    pub fn new(sites: Sites, moduli: Moduli) -> Self {
         Lattice::of(sites, moduli, None)
     }
 
     /// A lattice whose sites have volumetric moduli `w_i T` (N/mm) of their own, beside `w_i k_s`.
-    pub fn with_volumetric(sites: &'a Sites, moduli: Moduli, volumetric: Vec<f64>) -> Self {
+    pub fn with_volumetric(sites: Sites, moduli: Moduli, volumetric: Vec<f64>) -> Self {
         assert!(volumetric.len() == sites.len());
         Lattice::of(sites, moduli, Some(volumetric))
     }
 
-    fn of(sites: &'a Sites, moduli: Moduli, own_volumetric: Option<Vec<f64>>) -> Self {
+    fn of(sites: Sites, moduli: Moduli, own_volumetric: Option<Vec<f64>>) -> Self {
         let stencil = sites.frame.structure.stencil();
         let pair = |(p, d): (usize, &[i32; 3])| {
             let d = d.map(f64::from);
@@ -89,14 +89,14 @@ impl<'a> Lattice<'a> {
             }
         };
         let pairs: Vec<Pair> = stencil.pairs.iter().enumerate().map(pair).collect();
-        let graded = sites.weights.is_some();
+        let weighted = sites.weights.is_some();
         let double = Scaled {
-            pairs: pairs.iter().map(|p| p.scaled(graded)).collect(),
+            pairs: pairs.iter().map(|p| p.scaled(weighted)).collect(),
             weights: sites.weights.clone(),
             volumetric: moduli.t,
             own_volumetric,
         };
-        let room = if double.is_volumetric() {
+        let scratch = if double.is_volumetric() {
             sites.len()
         } else {
             0
@@ -107,7 +107,7 @@ impl<'a> Lattice<'a> {
             pairs,
             single: double.to_single(),
             double,
-            room: Mutex::new(vec![[0.0; 2]; room]),
+            scratch: Mutex::new(vec![[0.0; 2]; scratch]),
         }
     }
 
@@ -158,7 +158,7 @@ impl<'a> Lattice<'a> {
     }
 }
 
-impl Virial for Lattice<'_> {
+impl Virial for Lattice {
     fn virial<S: Copy + Into<f64>>(
         &self,
         u: &[[S; 3]],
@@ -175,7 +175,7 @@ impl Virial for Lattice<'_> {
     }
 }
 
-impl Lattice<'_> {
+impl Lattice {
     fn site_virial<S: Copy + Into<f64>>(&self, u: &[[S; 3]], site: usize, row: &[u32]) -> f64 {
         let (axis, grips) = (self.sites.frame.axis.index(), self.sites.grips);
         let theta = match self.double.is_volumetric() {
@@ -209,10 +209,10 @@ impl Lattice<'_> {
 }
 
 impl Pair {
-    /// The pair as the kernels want it; on graded lattices with the half of `½ (w_i + w_j)`.
-    fn scaled(&self, graded: bool) -> kernel::Pair<f64> {
+    /// The pair as the kernels want it; where sites are weighted with the half of `½ (w_i + w_j)`.
+    fn scaled(&self, weighted: bool) -> kernel::Pair<f64> {
         let d = self.d;
-        let c = -self.spring * if graded { 0.5 } else { 1.0 };
+        let c = -self.spring * if weighted { 0.5 } else { 1.0 };
         let cyclic = |turn: usize| {
             let [x, y, z] = [0, 1, 2].map(|a| c * d[a] * d[(a + 3 - turn) % 3]);
             [x, y, z, 0.0]
@@ -229,14 +229,15 @@ fn along<S: Copy + Into<f64>>(d: [f64; 3], a: [S; 3], b: [S; 3]) -> f64 {
     (0..3).map(|c| d[c] * (a[c].into() - b[c].into())).sum()
 }
 
-impl Operator<3> for Lattice<'_> {
+impl Operator<3> for Lattice {
     fn sites(&self) -> usize {
         self.sites.len()
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        let mut room = self.room();
-        self.double.apply(self.sites, x, y, &mut room, |_, _| 0.0);
+        let mut scratch = self.scratch();
+        self.double
+            .apply(&self.sites, x, y, &mut scratch, |_, _| 0.0);
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
@@ -250,27 +251,27 @@ impl Operator<3> for Lattice<'_> {
     }
 }
 
-impl MixedPrecision for Lattice<'_> {
+impl MixedPrecision for Lattice {
     fn apply_single(
         &self,
         x: &[[f32; 3]],
         y: &mut [[f32; 3]],
         finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
     ) -> f64 {
-        let mut room = self.room();
-        let sites = room.len();
-        let room = &mut bytemuck::cast_slice_mut(&mut room)[..sites];
-        self.single.apply(self.sites, x, y, room, finish)
+        let mut scratch = self.scratch();
+        let sites = scratch.len();
+        let scratch = &mut bytemuck::cast_slice_mut(&mut scratch)[..sites];
+        self.single.apply(&self.sites, x, y, scratch, finish)
     }
 
-    fn each_part(
+    fn for_each_chunk(
         &self,
         x: &[[f64; 3]],
         out: &mut [[f32; 3]],
-        take: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+        consume: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        let (sites, double) = (self.sites, &self.double);
-        let mut t = self.room();
+        let (sites, double) = (&self.sites, &self.double);
+        let mut t = self.scratch();
         t.par_chunks_mut(PORTION).enumerate().for_each(|(c, t)| {
             double.pressures(sites, range(c, t.len()), x, t);
         });
@@ -282,17 +283,17 @@ impl MixedPrecision for Lattice<'_> {
             if !t.is_empty() {
                 double.add_volumetric_forces(sites, own, &t, image);
             }
-            take(first, image, out)
+            consume(first, image, out)
         })
     }
 }
 
-impl Lattice<'_> {
-    /// Room for every site's `w T θ`; empty at ν = ¼, where no volumetric pass is made.
-    fn room(&self) -> MutexGuard<'_, Vec<[f64; 2]>> {
-        self.room
+impl Lattice {
+    /// Scratch for every site's `w T θ`; empty at ν = ¼, where no volumetric pass is made.
+    fn scratch(&self) -> MutexGuard<'_, Vec<[f64; 2]>> {
+        self.scratch
             .lock()
-            .expect("no application panics while it holds the room")
+            .expect("no application panics while it holds the scratch")
     }
 
     fn site_diagonal(&self, site: usize, row: &[u32]) -> [f64; 3] {

@@ -13,7 +13,7 @@ use std::ops::Range;
 
 /// The springs of a lattice as an operator of their own.
 pub struct Springs<'a> {
-    lattice: &'a Lattice<'a>,
+    lattice: &'a Lattice,
     /// By pair: `½ k n nᵀ` of a bond between sites of weight 1.
     stiffness: Vec<[[f64; 3]; 3]>,
     /// Its negative, what such a bond couples its ends by.
@@ -21,7 +21,7 @@ pub struct Springs<'a> {
 }
 
 impl<'a> Springs<'a> {
-    pub fn new(lattice: &'a Lattice<'a>) -> Self {
+    pub fn new(lattice: &'a Lattice) -> Self {
         let stiffness = |p: &super::Pair| p.d.map(|a| p.d.map(|b| p.spring * a * b));
         let stiffness: Vec<_> = lattice.pairs.iter().map(stiffness).collect();
         let negative = |k: &[[f64; 3]; 3]| k.map(|row| row.map(|v| -v as f32));
@@ -73,7 +73,7 @@ impl Operator<3> for Springs<'_> {
 
 impl Coarsen for Springs<'_> {
     fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
-        let Sites { frame, indices, .. } = self.lattice.sites;
+        let Sites { frame, indices, .. } = &self.lattice.sites;
         for (x, at) in x.iter_mut().zip(&indices[sites]) {
             *x = frame.position_mm(*at);
         }
@@ -118,11 +118,15 @@ impl Coarsen for Springs<'_> {
     }
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        self.lattice.double.springs(self.lattice.sites, sites, x, y);
+        self.lattice
+            .double
+            .springs(&self.lattice.sites, sites, x, y);
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
-        self.lattice.single.springs(self.lattice.sites, sites, x, y);
+        self.lattice
+            .single
+            .springs(&self.lattice.sites, sites, x, y);
     }
 
     /// Of one spring, `(u_i − u_j)² <= 2 u_i² + 2 u_j²`.

@@ -5,7 +5,7 @@ use super::{PORTION, range};
 use crate::discretisation::lattice::sites::Sites;
 use crate::discretisation::lattice::stencil::Structure;
 use crate::par::each_chunk;
-use crate::simd::vec3::{Precision, Quad};
+use crate::simd::vec3::{Precision, Vec3Lanes};
 use crate::simd::{Isa, isa};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -75,7 +75,7 @@ impl<S: Precision> Scaled<S> {
         assert!(u.len() == sites.len() && y.len() == range.len() && t.len() == range.len());
         let theta = &mut *t;
         self.perform(sites, range.clone(), Task::SpringsAndSums { u, y, theta });
-        self.weigh(range, t);
+        self.scale_by_weights(range, t);
     }
 
     /// `w_i T θ_{s,i}` at `range`.
@@ -83,10 +83,10 @@ impl<S: Precision> Scaled<S> {
         assert!(u.len() == sites.len() && t.len() == range.len());
         let theta = &mut *t;
         self.perform(sites, range.clone(), Task::Sums { u, theta });
-        self.weigh(range, t);
+        self.scale_by_weights(range, t);
     }
 
-    fn weigh(&self, range: Range<usize>, t: &mut [[S; 2]]) {
+    fn scale_by_weights(&self, range: Range<usize>, t: &mut [[S; 2]]) {
         for (site, t) in range.zip(t) {
             let factor = self.volumetric(site);
             *t = t.map(|sum| factor * sum);
@@ -123,7 +123,7 @@ impl<S: Precision> Scaled<S> {
         }
     }
 
-    /// `y = K u`, part by part; `t` is room for every site's `w T θ`. Each part, with its first site, is given to
+    /// `y = K u`, part by part; `t` is scratch for every site's `w T θ`. Each part, with its first site, is given to
     /// `finish`, whose values are added up in order.
     pub fn apply(
         &self,
@@ -181,6 +181,7 @@ unsafe fn on_this_processor<H: Shape, S: Precision>(
     sites: Range<usize>,
     task: Task<S>,
 ) {
+    // SAFETY: `isa` says what the processor has; the rest is the caller's promise.
     unsafe {
         match isa() {
             #[cfg(target_arch = "x86_64")]
@@ -191,9 +192,12 @@ unsafe fn on_this_processor<H: Shape, S: Precision>(
 }
 
 /// [`perform`] compiled for AVX2 with fused multiply-add.
+///
+/// # Safety
+/// As [`kernel::springs`].
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn with_avx2<H: Shape, Q: Quad>(
+unsafe fn with_avx2<H: Shape, Q: Vec3Lanes>(
     bonds: Bonds<Q::S>,
     weights: Option<&[Q::S]>,
     sites: Range<usize>,
@@ -201,13 +205,14 @@ unsafe fn with_avx2<H: Shape, Q: Quad>(
 ) where
     Q::S: Precision,
 {
+    // SAFETY: the caller's promise.
     unsafe { perform::<H, Q>(bonds, weights, sites, task) }
 }
 
 /// # Safety
 /// As [`kernel::springs`].
 #[inline(always)]
-unsafe fn perform<H: Shape, Q: Quad>(
+unsafe fn perform<H: Shape, Q: Vec3Lanes>(
     bonds: Bonds<Q::S>,
     weights: Option<&[Q::S]>,
     sites: Range<usize>,
@@ -215,11 +220,12 @@ unsafe fn perform<H: Shape, Q: Quad>(
 ) where
     Q::S: Precision,
 {
+    // SAFETY: the caller's promise; `Scaled` has checked that each field has an entry a site.
     unsafe {
         match (task, weights) {
             (Task::Springs { u, y }, None) => kernel::springs::<H, Q>(bonds, sites, u, y),
             (Task::Springs { u, y }, Some(w)) => {
-                kernel::graded_springs::<H, Q>(bonds, w, sites, u, y);
+                kernel::weighted_springs::<H, Q>(bonds, w, sites, u, y);
             }
             (Task::Sums { u, theta }, _) => {
                 kernel::volumetric_sums::<H, Q>(bonds, sites, u, theta);
@@ -228,7 +234,7 @@ unsafe fn perform<H: Shape, Q: Quad>(
                 kernel::springs_and_sums::<H, Q>(bonds, sites, u, y, theta);
             }
             (Task::SpringsAndSums { u, y, theta }, Some(w)) => {
-                kernel::graded_springs::<H, Q>(bonds, w, sites.clone(), u, y);
+                kernel::weighted_springs::<H, Q>(bonds, w, sites.clone(), u, y);
                 kernel::volumetric_sums::<H, Q>(bonds, sites, u, theta);
             }
             (Task::VolumetricForces { t, y }, _) => {

@@ -1,6 +1,6 @@
 //! Owns what a solve yields, and its row of the results table.
 
-use crate::pipeline::apparent::{Load, SolveParams};
+use crate::pipeline::apparent::params::{Load, SolveParams};
 use crate::result::row::{Marks, Row, Solution};
 use crate::result::settings::{Settings, Supports};
 use crate::solver::cg::Ended;
@@ -29,7 +29,7 @@ pub struct Solved {
     pub residual: f64,
     pub ended: Ended,
     pub moduli: Moduli,
-    /// Where asked for.
+    /// Only where the settings ask for a count.
     pub mechanisms: Option<usize>,
 }
 

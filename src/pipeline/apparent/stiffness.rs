@@ -1,21 +1,19 @@
-//! Owns the apparent stiffness matrix: six unit strains on voxel elements, one preconditioner per set of supports.
+//! Owns the apparent stiffness matrix: six unit strains, one preconditioner per set of supports.
 
-use crate::discretisation::voxels::VoxelMesh;
 use crate::error::{Error, Result};
-use crate::measure::stiffness::{Six, unit_strain};
-use crate::operator::Operator;
-use crate::operator::held::Held;
+use crate::measure::stiffness::Six;
+use crate::operator::MixedPrecision;
 use crate::par::{CHUNK, dot, sum_chunks};
-use crate::pipeline::apparent::bricks::{Bricks, Keep};
-use crate::pipeline::apparent::resolution::{one_element_a_voxel, resolved};
-use crate::pipeline::apparent::{Conditions, SolveParams};
-use crate::solver::amg::{Amg, AmgParams};
-use crate::solver::cg::fallback::minimise_or_fall_back;
-use crate::solver::cg::{CgParams, CgStep, ENERGY_ALONE, Ended};
+use crate::pipeline::apparent::discretisation::{
+    Discretisation, Displacements, LoadSet, Prepared, System,
+};
+use crate::pipeline::apparent::equilibrium::{Observe, equilibrium};
+use crate::pipeline::apparent::params::{Conditions, SolveParams};
+use crate::solver::cg::{CgInfo, Ended};
 use crate::volume::Specimen;
 use rayon::prelude::*;
 
-/// An apparent stiffness and how it was come by. Voigt order 11, 22, 33, 23, 13, 12, engineering shears, MPa.
+/// Apparent stiffness matrix and statistics of its solves. Voigt order 11, 22, 33, 23, 13, 12, engineering shears, MPa.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stiffness {
     pub elements: usize,
@@ -45,15 +43,36 @@ pub struct Stiffness {
 /// stress `i` under strain `j`, off to first order outside the diagonal, so the energy is known to the tolerance's square.
 ///
 /// # Errors
-/// A volume of interest that is no box, too many nodes.
-pub fn solve_stiffness(
-    specimen: &Specimen,
+/// A volume of interest that is no box, a discretisation without faces, too many nodes.
+pub fn stiffness<D: Discretisation>(
+    case: &D::Case,
+    prepared: Prepared,
     params: &SolveParams,
-    mut observe: impl FnMut(usize, CgStep),
+    observe: &mut Observe,
 ) -> Result<Stiffness> {
-    params.check()?;
-    let size = specimen.bone.grid.size_mm();
-    let volume = size.iter().product::<f64>();
+    let volume = box_mm3(prepared.specimen)?;
+    let model = D::build(case, prepared, params)?;
+    let mut products = Products::new(params.conditions);
+    let mut sum = Stiffness::none();
+    for &loads in groups(params.conditions) {
+        let system = model.system(LoadSet::UnitStrains(loads));
+        (sum.elements, sum.dropped) = (system.sites, system.dropped);
+        if system.sites == 0 {
+            return Ok(sum);
+        }
+        sum.unknowns = sum.unknowns.max(system.held.free::<3>());
+        for (load, u, info) in equilibrium(&system, loads, params, observe) {
+            sum.add(load, &info);
+            products.add(&system, load, u, info.energy_error);
+        }
+    }
+    (sum.matrix_mpa, sum.error_mpa, sum.asymmetry_mpa) = products.stiffness(volume);
+    Ok(sum)
+}
+
+/// Volume of the specimen's grid, which must be its volume of interest.
+fn box_mm3(specimen: &Specimen) -> Result<f64> {
+    let volume = specimen.bone.grid.size_mm().iter().product::<f64>();
     if (specimen.tv_mm3 / volume - 1.0).abs() > 1e-9 {
         return Err(Error::specimen(
             format!(
@@ -63,69 +82,31 @@ pub fn solve_stiffness(
             "segment with --voi box and a --crop inside the specimen",
         ));
     }
-    if let Some(resolved) = resolved(specimen, params)? {
-        return of_faces(&resolved, &one_element_a_voxel(params), &mut observe);
-    }
-    of_faces(specimen, params, &mut observe)
+    Ok(volume)
 }
 
-/// The same for the elements that follow from a specimen's voxels alone.
-fn of_faces(
-    specimen: &Specimen,
-    params: &SolveParams,
-    observe: &mut impl FnMut(usize, CgStep),
-) -> Result<Stiffness> {
-    let volume = specimen.bone.grid.size_mm().iter().product::<f64>();
-    let model = Bricks::new(specimen, params, Keep::AtFaces)?;
-    let mesh = model.mesh();
-    let mut sum = Stiffness {
-        elements: mesh.elements,
-        dropped: mesh.dropped,
-        unknowns: 0,
-        iterations: [0; 6],
-        residual: 0.0,
-        ended: Ended::EnergyTolerance,
-        matrix_mpa: [[0.0; 6]; 6],
-        error_mpa: [[0.0; 6]; 6],
-        asymmetry_mpa: 0.0,
-    };
-    if mesh.is_empty() {
-        return Ok(sum);
-    }
-    let cg = CgParams {
-        energy_tolerance: match params.conditions {
-            Conditions::Kinematic => params.tolerance,
-            Conditions::Mixed => params.tolerance.powi(2),
-        },
-        max_iterations: params.max_iterations,
-        ..CgParams::default()
-    };
-    let mut products = Products::new(params.conditions);
-    for &loads in groups(params.conditions) {
-        let held = supports(mesh, params.conditions, loads[0]);
-        let preconditioner = Amg::new(&model, &held, &AmgParams::new(mesh.grid.spacing_mm));
-        sum.unknowns = sum.unknowns.max(held.free::<3>());
-        for &load in loads {
-            let mut u = affine(mesh, load);
-            let info = minimise_or_fall_back(
-                &model,
-                &held,
-                &preconditioner,
-                &mut u,
-                &cg,
-                ENERGY_ALONE,
-                |step| observe(load, step),
-            );
-            sum.iterations[load] = info.iterations;
-            sum.residual = sum.residual.max(info.residual);
-            if !info.ended.converged() {
-                sum.ended = info.ended;
-            }
-            products.take(&model, load, u, info.energy_error);
+impl Stiffness {
+    fn none() -> Self {
+        Stiffness {
+            elements: 0,
+            dropped: 0,
+            unknowns: 0,
+            iterations: [0; 6],
+            residual: 0.0,
+            ended: Ended::EnergyTolerance,
+            matrix_mpa: [[0.0; 6]; 6],
+            error_mpa: [[0.0; 6]; 6],
+            asymmetry_mpa: 0.0,
         }
     }
-    (sum.matrix_mpa, sum.error_mpa, sum.asymmetry_mpa) = products.stiffness(volume);
-    Ok(sum)
+
+    fn add(&mut self, load: usize, info: &CgInfo) {
+        self.iterations[load] = info.iterations;
+        self.residual = self.residual.max(info.residual);
+        if !info.ended.converged() {
+            self.ended = info.ended;
+        }
+    }
 }
 
 /// Loads that share their supports.
@@ -134,53 +115,6 @@ fn groups(conditions: Conditions) -> &'static [&'static [usize]] {
         Conditions::Kinematic => &[&[0, 1, 2, 3, 4, 5]],
         Conditions::Mixed => &[&[0, 1, 2], &[3], &[4], &[5]],
     }
-}
-
-/// The components of `u = ε x` that a load prescribes, and padding.
-fn supports(mesh: &VoxelMesh, conditions: Conditions, load: usize) -> Held {
-    let prescribed = |face: usize, component: usize| match (conditions, load) {
-        (Conditions::Kinematic, _) => true,
-        (Conditions::Mixed, 0..3) => component == face,
-        // Shear in the plane of p and q, out of it r: p's faces carry u_q and u_r, q's u_p and u_r, r's u_r.
-        (Conditions::Mixed, _) => {
-            let out = load - 3;
-            component == out || face != out && component != face
-        }
-    };
-    let mut held = Held::none(mesh.len());
-    each_node(mesh, |node, at| {
-        let on = |face: &usize| at[*face] == 0 || at[*face] == mesh.grid.n[*face];
-        for component in 0..3 {
-            let stopped = (0..3).filter(on).any(|face| prescribed(face, component));
-            if mesh.around[node] == 0 || stopped {
-                held.hold(node, component);
-            }
-        }
-    });
-    held
-}
-
-fn each_node(mesh: &VoxelMesh, mut f: impl FnMut(usize, [usize; 3])) {
-    for segment in &mesh.segments {
-        let [x, y, z] = segment.at.map(|v| v as usize);
-        for (i, node) in segment.nodes().enumerate() {
-            f(node, [x + i, y, z]);
-        }
-    }
-}
-
-/// `u = ε x` of a unit strain, `x` from the middle of the box.
-fn affine(mesh: &VoxelMesh, load: usize) -> Vec<[f64; 3]> {
-    let (strain, size) = (unit_strain(load), mesh.grid.size_mm());
-    let mut u = vec![[0.0; 3]; mesh.len()];
-    each_node(mesh, |node, at| {
-        if mesh.around[node] != 0 {
-            let x: [f64; 3] =
-                std::array::from_fn(|a| at[a] as f64 * mesh.grid.spacing_mm[a] - 0.5 * size[a]);
-            u[node] = strain.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2]);
-        }
-    });
-    u
 }
 
 /// What is drawn from each solved load before the next.
@@ -209,14 +143,19 @@ impl Products {
     }
 
     /// Loads come in order.
-    fn take(&mut self, model: &Bricks, load: usize, mut u: Vec<[f64; 3]>, error: f64) {
-        let mesh = model.mesh();
-        let mut force = vec![[0.0; 3]; mesh.len()];
-        model.apply(&u, &mut force);
+    fn add<O: MixedPrecision, C, G>(
+        &mut self,
+        system: &System<O, C, G>,
+        load: usize,
+        mut u: Displacements,
+        error: f64,
+    ) {
+        let mut force = vec![[0.0; 3]; u.len()];
+        system.operator.apply(&u, &mut force);
         self.error[load] = error;
         self.work[load][load] = dot(&u, &force);
         for other in (0..6).filter(|&other| other != load) {
-            self.work[other][load] = dot(&affine(mesh, other), &force);
+            self.work[other][load] = dot(&(system.start)(other), &force);
         }
         match self.conditions {
             Conditions::Kinematic => {
@@ -224,13 +163,13 @@ impl Products {
                     self.work[other][load] += mixed_dot(departure, &force);
                     self.work[load][other] = self.work[other][load];
                 }
-                subtract(&mut u, &affine(mesh, load));
+                subtract(&mut u, &(system.start)(load));
                 let single = u.par_iter().map(|u| u.map(|v| v as f32)).collect();
                 self.departures.push(single);
             }
             Conditions::Mixed => {
-                let homogeneous = affine(mesh, load);
-                model.apply(&homogeneous, &mut force);
+                let homogeneous = (system.start)(load);
+                system.operator.apply(&homogeneous, &mut force);
                 self.affine[load] = dot(&homogeneous, &force);
             }
         }

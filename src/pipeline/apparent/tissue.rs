@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::physics::material::{Law, Material, Solid};
-use crate::pipeline::apparent::SolveParams;
+use crate::pipeline::apparent::params::SolveParams;
 use crate::result::settings::Settings;
 use crate::volume::Specimen;
 use rayon::prelude::*;
@@ -67,9 +67,9 @@ impl Tissue {
                     .map_or(f32::NAN, |e| e as f32),
             })
             .collect();
-        refuse_strangers(material, bone, grey, &young)?;
+        refuse_without_modulus(material, bone, grey, &young)?;
         let (kind, poissons) = poissons(material, params.poisson, bone, grey);
-        Ok(gathered(bone, young, kind, poissons))
+        Ok(tissue_of(bone, young, kind, poissons))
     }
 
     /// Mean modulus over the bone.
@@ -98,14 +98,19 @@ impl Tissue {
 }
 
 /// Bone voxels without a modulus above 0 are an error that names their values.
-fn refuse_strangers(material: &Material, bone: &[u8], grey: &[f32], young: &[f32]) -> Result<()> {
-    let strange = |i: &usize| bone[*i] != 0 && !(young[*i] > 0.0 && young[*i].is_finite());
-    let count = (0..bone.len()).into_par_iter().filter(strange).count();
+fn refuse_without_modulus(
+    material: &Material,
+    bone: &[u8],
+    grey: &[f32],
+    young: &[f32],
+) -> Result<()> {
+    let without = |i: &usize| bone[*i] != 0 && !(young[*i] > 0.0 && young[*i].is_finite());
+    let count = (0..bone.len()).into_par_iter().filter(without).count();
     if count == 0 {
         return Ok(());
     }
     let mut values = BTreeMap::new();
-    for i in (0..bone.len()).filter(strange).take(1_000_000) {
+    for i in (0..bone.len()).filter(without).take(1_000_000) {
         *values.entry(grey[i].to_string()).or_insert(0u64) += 1;
     }
     let some: Vec<&str> = values.keys().take(5).map(String::as_str).collect();
@@ -154,7 +159,7 @@ fn poissons(material: &Material, poisson: f64, bone: &[u8], grey: &[f32]) -> (Ve
 }
 
 /// One solid where all voxels turn out alike.
-fn gathered(bone: &[u8], mut young: Vec<f32>, kind: Vec<u8>, poissons: Vec<f64>) -> Tissue {
+fn tissue_of(bone: &[u8], mut young: Vec<f32>, kind: Vec<u8>, poissons: Vec<f64>) -> Tissue {
     let first = (0..bone.len()).find(|&i| bone[i] != 0);
     let alike = first.filter(|&f| {
         let same = |i: usize| bone[i] == 0 || young[i] == young[f];

@@ -1,5 +1,6 @@
 //! Owns phantoms: synthetic trabecular scans with known truth, the same on every machine for the same settings.
 
+mod body;
 mod grey;
 mod shape;
 mod waves;
@@ -9,6 +10,8 @@ use crate::grid::Grid;
 use crate::mask::components::Components;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::volume::Volume;
+use body::{Body, sample};
+pub use body::{BodyKind, BodyParams, Orientation};
 use serde::{Deserialize, Serialize};
 use shape::Shape;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -39,6 +42,9 @@ pub struct PhantomParams {
     pub debris_per_mm3: f64,
     /// Empty middle of this length along z, so that the faces are not connected.
     pub gap_mm: f64,
+    /// An analytic body in place of the random field; thickness, anisotropy, perforation, debris and gap are the field's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<BodyParams>,
 }
 
 impl Default for PhantomParams {
@@ -57,6 +63,7 @@ impl Default for PhantomParams {
             blur_voxels: 0.7,
             debris_per_mm3: 1.0,
             gap_mm: 0.0,
+            body: None,
         }
     }
 }
@@ -78,15 +85,6 @@ impl PhantomParams {
 
     /// Refuses what cannot be made.
     pub fn check(&self) -> Result<()> {
-        let range =
-            |key: &str, v: f64, low: f64, high: f64, advice: &str| match v >= low && v <= high {
-                true => Ok(()),
-                false => Err(Error::setting(
-                    key,
-                    format!("{v} is not between {low} and {high}"),
-                    advice,
-                )),
-            };
         range("bvtv", self.bvtv, 0.02, 0.7, "bone has 0.05 to 0.4")?;
         range(
             "spacing-mm",
@@ -105,6 +103,18 @@ impl PhantomParams {
             )?;
         }
         let shortest = self.size_mm.iter().copied().fold(f64::INFINITY, f64::min);
+        match &self.body {
+            Some(body) => body.check(self.spacing_mm, shortest)?,
+            None => self.check_field(shortest)?,
+        }
+        range("noise-hu", self.noise_hu, 0.0, 5000.0, "100 is usual")?;
+        range("blur", self.blur_voxels, 0.0, 5.0, "0.5 to 1 is usual")?;
+        let voxels: f64 = self.size_mm.iter().map(|l| l / self.spacing_mm).product();
+        range("size-mm", voxels, 1.0, 8e9, "fewer or larger voxels")
+    }
+
+    /// Refuses what a random field cannot be.
+    fn check_field(&self, shortest: f64) -> Result<()> {
         range(
             "thickness-mm",
             self.thickness_mm,
@@ -126,8 +136,6 @@ impl PhantomParams {
             0.6,
             "plates fall apart above about 0.5",
         )?;
-        range("noise-hu", self.noise_hu, 0.0, 5000.0, "100 is usual")?;
-        range("blur", self.blur_voxels, 0.0, 5.0, "0.5 to 1 is usual")?;
         range(
             "debris",
             self.debris_per_mm3,
@@ -141,9 +149,7 @@ impl PhantomParams {
             0.0,
             self.size_mm[2],
             "a gap is part of the height",
-        )?;
-        let voxels: f64 = self.size_mm.iter().map(|l| l / self.spacing_mm).product();
-        range("size-mm", voxels, 1.0, 8e9, "fewer or larger voxels")
+        )
     }
 
     /// As many whole voxels as come nearest to the size.
@@ -152,6 +158,18 @@ impl PhantomParams {
             .size_mm
             .map(|l| ((l / self.spacing_mm).round() as usize).max(1));
         Grid::new(n, [self.spacing_mm; 3])
+    }
+}
+
+/// Refuses a value that is not within its limits.
+fn range(key: &str, v: f64, low: f64, high: f64, advice: &str) -> Result<()> {
+    match v >= low && v <= high {
+        true => Ok(()),
+        false => Err(Error::setting(
+            key,
+            format!("{v} is not between {low} and {high}"),
+            advice,
+        )),
     }
 }
 
@@ -172,14 +190,30 @@ pub struct PhantomSummary {
 /// A phantom's truth and its scan.
 #[derive(Debug, Clone)]
 pub struct Phantom {
-    /// 1 where bone; one connected piece, no debris.
+    /// 1 where bone. Of a random field one connected piece, no debris; of a body wherever a voxel's middle lies in it.
     pub mask: Volume<u8>,
     pub summary: PhantomSummary,
+    body: Option<Body>,
 }
 
 /// The clean structure.
 pub fn structure(params: &PhantomParams) -> Result<Phantom> {
     params.check()?;
+    let Some(body) = &params.body else {
+        return random_field(params);
+    };
+    let body = Body::new(params, body);
+    let mask = sample::mask(&body, params);
+    let summary = summary_of(&mask, count(&mask), 0);
+    let body = Some(body);
+    Ok(Phantom {
+        mask,
+        summary,
+        body,
+    })
+}
+
+fn random_field(params: &PhantomParams) -> Result<Phantom> {
     let grid = params.grid();
     let shape = Shape::new(params);
     let counts = hole_levels(&shape, &grid);
@@ -202,24 +236,35 @@ pub fn structure(params: &PhantomParams) -> Result<Phantom> {
         asked = (asked + wanted).saturating_sub(kept);
     }
     let (mask, kept, removed) = closest.expect("at least one was carved");
-    let summary = PhantomSummary {
-        voxels: grid.n,
-        bv_tv: kept as f64 / grid.len() as f64,
-        plate_thickness_mm: plate_thickness_mm(&mask),
+    let summary = summary_of(&mask, kept, removed);
+    Ok(Phantom {
+        mask,
+        summary,
+        body: None,
+    })
+}
+
+fn summary_of(mask: &Volume<u8>, bone: u64, removed: u64) -> PhantomSummary {
+    PhantomSummary {
+        voxels: mask.grid.n,
+        bv_tv: bone as f64 / mask.grid.len() as f64,
+        plate_thickness_mm: plate_thickness_mm(mask),
         removed_voxels: removed,
-        connects_z: Components::of(&mask)
-            .spanning_z(&mask)
+        connects_z: Components::of(mask)
+            .spanning_z(mask)
             .into_iter()
             .next()
             .is_some(),
         debris: 0,
-    };
-    Ok(Phantom { mask, summary })
+    }
 }
 
-/// The scan of a structure: debris, blur and noise over two grey values, rounded to whole HU.
+/// The scan of a structure: debris (of a random field) or partial volumes (of a body), blur and noise over two grey values, rounded to whole HU.
 pub fn scan(phantom: &mut Phantom, params: &PhantomParams) -> Volume<i16> {
-    grey::scan(phantom, params)
+    match &phantom.body {
+        Some(body) => sample::scan(body, params),
+        None => grey::scan(phantom, params),
+    }
 }
 
 /// Bins between -5 and 5 standard deviations of the hole field; a bin is 1e-4 of a phantom's bone.

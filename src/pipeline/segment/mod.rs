@@ -1,14 +1,15 @@
 //! Owns segmentation: place, smooth, threshold, volume of interest, connectivity, flat ends, in that order.
 
+pub mod laid;
 mod params;
 mod place;
 mod region;
 mod summary;
 mod window;
 
-pub use params::{Align, AlignBox, SegmentParams, Voi};
+pub use params::{Align, AlignBox, SegmentParams, Voi, shown};
 pub use place::Rotation;
-pub use summary::{SegmentSummary, Surface};
+pub use summary::{SegmentSummary, Surface, implausible_voxels, refuse_impossible_voxels};
 
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -22,7 +23,9 @@ use crate::volume::{Specimen, Threshold, Volume};
 use place::{Placed, place};
 use region::inside;
 use std::borrow::Cow;
-use window::{bone_of, count, has_grey_values, no_label, nothing_selected, smoothed};
+use window::{
+    bone_of, count, has_grey_values, no_label, nothing_selected, smoothed, takes_padding,
+};
 
 /// A segmented scan with its numbers.
 #[derive(Debug, Clone)]
@@ -40,6 +43,17 @@ pub fn segment<'a>(
     params: &SegmentParams,
     voi_mask: Option<&'a Volume<u8>>,
 ) -> Result<Segmented<'a>> {
+    segment_padded(name, scan, params, voi_mask, None)
+}
+
+/// The same for a scan whose file says that values from the first to the second of `padding` stand for no measurement.
+pub fn segment_padded<'a>(
+    name: &str,
+    scan: &'a Volume<f32>,
+    params: &SegmentParams,
+    voi_mask: Option<&'a Volume<u8>>,
+    padding: Option<[f32; 2]>,
+) -> Result<Segmented<'a>> {
     params.check()?;
     let threshold = params.otsu || params.lower.is_some() || params.upper.is_some();
     if !threshold && params.labels.is_empty() {
@@ -49,7 +63,7 @@ pub fn segment<'a>(
             "give --lower (and --upper), --otsu, or the --labels of a segmented scan",
         ));
     }
-    let mut placed = place(scan, params, voi_mask)?;
+    let mut placed = place(scan, params, voi_mask, padding)?;
     let mut found = find(&placed, params)?;
     let plane_cut_mm = match params.plane_cut_mm {
         Some(tile_mm) => Some(cut(&mut placed, &mut found, params, tile_mm)?),
@@ -80,8 +94,8 @@ pub fn segment<'a>(
     let mut summary = SegmentSummary {
         voxels: grid.n,
         spacing_mm: grid.spacing_mm,
-        lower: placed.window.0,
-        upper: placed.window.1,
+        lower: placed.window.lower,
+        upper: placed.window.upper,
         threshold: params.threshold().into(),
         surface: match specimen.threshold {
             Some(_) => Surface::Grey,
@@ -107,9 +121,15 @@ pub fn segment<'a>(
             let within = inside.mask(grid);
             morphometry(&specimen.bone, within.as_ref(), tv_mm3)
         }),
+        notes: placed.window.notes.clone(),
         warnings: Vec::new(),
     };
     summary.warnings = summary::warnings(&summary);
+    if params.has_window() {
+        let voxels = grid.len() as u64;
+        let padded = takes_padding(&placed.window, &placed.grey, voxels);
+        summary.warnings.extend(padded);
+    }
     Ok(Segmented {
         specimen,
         summary,
@@ -127,7 +147,7 @@ struct Found {
 }
 
 fn find(placed: &Placed, params: &SegmentParams) -> Result<Found> {
-    let (scan, grey, window) = (&*placed.scan, &placed.grey, placed.window);
+    let (scan, grey, window) = (&*placed.scan, &placed.grey, &placed.window);
     let voi_mask = placed.voi_mask.as_deref();
     let (inside, tv_definition) = inside(&params.voi, scan.grid, voi_mask, placed.corner_mm)?;
     let mut bone = bone_of(scan, params, grey, window);
@@ -136,7 +156,7 @@ fn find(placed: &Placed, params: &SegmentParams) -> Result<Found> {
         return Err(no_label(scan, &params.labels));
     }
     if selected == 0 {
-        return Err(nothing_selected(window.0, window.1, grey));
+        return Err(nothing_selected(window, grey));
     }
     let outside = inside.clear_outside(&mut bone);
     let Some((components, removed)) = join(&mut bone, params.keep_all) else {
@@ -166,7 +186,7 @@ fn threshold_of(
     if !params.labels.is_empty() || !has_grey_values(&placed.scan) {
         return None;
     }
-    let (lower, upper) = placed.window;
+    let (lower, upper) = (placed.window.lower, placed.window.upper);
     Some(Threshold {
         lower: lower.map_or(f32::NEG_INFINITY, |v| v as f32),
         upper: upper.map_or(f32::INFINITY, |v| v as f32),

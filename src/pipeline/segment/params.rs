@@ -2,9 +2,10 @@
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
+use crate::image::array::headerless::Contents;
 use crate::image::calibration::GreyUnit;
-use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use serde::{Deserialize, Serialize, Serializer};
+use std::path::{Path, PathBuf};
 
 /// The volume of interest: which part of the scan is specimen, pores included.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
@@ -20,7 +21,7 @@ pub enum Voi {
         center_mm: Option<[f64; 2]>,
     },
     /// A mask image on the scan's grid; non-zero is inside.
-    Mask(PathBuf),
+    Mask(#[serde(serialize_with = "shown")] PathBuf),
 }
 
 /// A direction that is rotated to z, the load axis, by the shortest way.
@@ -50,6 +51,8 @@ pub enum AlignBox {
 pub struct SegmentParams {
     /// Overrides the file's voxel size.
     pub spacing_mm: Option<[f64; 3]>,
+    /// What is in a file of voxels without a header (`.raw`, `.vol`).
+    pub raw: Option<Contents>,
     /// Of a Scanco scan's grey values, and so of the window. None: as stored, with a warning where a window is given.
     pub units: Option<GreyUnit>,
     pub lower: Option<f64>,
@@ -83,6 +86,14 @@ pub struct SegmentParams {
     /// Also measure Tb.Th, Tb.Sp, Conn.D and DA of the mask.
     pub morphometry: bool,
 }
+
+/// Writes a path as text; what of it is no text is replaced.
+pub fn shown<S: Serializer>(path: &Path, to: S) -> std::result::Result<S::Ok, S::Error> {
+    to.serialize_str(&path.to_string_lossy())
+}
+
+/// Integers from here on are rounded: values are kept in single precision.
+pub(super) const MOST_LABEL: i32 = 1 << 24;
 
 /// Wider smoothing than this removes any trabecula.
 const MAX_SIGMA: f64 = 20.0;
@@ -130,6 +141,19 @@ impl SegmentParams {
                 "segment.labels",
                 "labels of a segmented scan go with no threshold and no smoothing".to_owned(),
                 "leave out lower, upper, otsu and gaussian, or the labels",
+            );
+        }
+        if let Some(label) = self
+            .labels
+            .iter()
+            .find(|l| l.unsigned_abs() >= MOST_LABEL as u32)
+        {
+            return refuse(
+                "segment.labels",
+                format!(
+                    "label {label} cannot be told from its neighbours: values are kept in single precision, which rounds integers from {MOST_LABEL} on"
+                ),
+                "number the labels anew with smaller numbers",
             );
         }
         if let (Some(lower), Some(upper)) = (self.lower, self.upper)

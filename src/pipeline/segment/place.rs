@@ -2,7 +2,7 @@
 
 use super::params::{Align, AlignBox};
 use super::region::{check_crop, same_grid};
-use super::window::{Grey, bone_of, grey_range, window};
+use super::window::{Grey, Window, bone_of, grey_range, window};
 use super::{SegmentParams, Voi};
 use crate::error::{Error, Result};
 use crate::grid::{Axis, Grid};
@@ -34,7 +34,7 @@ pub(super) struct Placed<'a> {
     pub corner_mm: [f64; 3],
     /// Before it was rotated.
     pub grey: Grey,
-    pub window: (Option<f64>, Option<f64>),
+    pub window: Window,
     pub rotation: Option<Rotation>,
 }
 
@@ -45,6 +45,7 @@ pub(super) fn place<'a>(
     scan: &'a Volume<f32>,
     params: &SegmentParams,
     voi_mask: Option<&'a Volume<u8>>,
+    padding: Option<[f32; 2]>,
 ) -> Result<Placed<'a>> {
     let mut scan = Cow::Borrowed(scan);
     let mut voi_mask = voi_mask.map(Cow::Borrowed);
@@ -77,7 +78,7 @@ pub(super) fn place<'a>(
         let near = |mask: Cow<Volume<u8>>| resampled(&grey_of(&mask), spacing, Between::Nearest);
         voi_mask = voi_mask.map(|mask| Cow::Owned(mask_of(&near(mask))));
     }
-    let grey = grey_range(&scan)?;
+    let grey = grey_range(&scan, padding)?;
     let mut placed = Placed {
         window: window(&scan, params, &grey)?,
         scan,
@@ -127,7 +128,7 @@ impl Placed<'_> {
 
     /// Of all bone, or of that in a volume of interest that is a mask: a cylinder stands in the rotated scan.
     fn fabric(&self, params: &SegmentParams) -> Result<Principal> {
-        let bone = bone_of(&self.scan, params, &self.grey, self.window);
+        let bone = bone_of(&self.scan, params, &self.grey, &self.window);
         principal(&bone, self.voi_mask.as_deref()).ok_or_else(|| {
             Error::specimen(
                 "no surface of bone to measure a fabric by",

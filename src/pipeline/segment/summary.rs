@@ -1,6 +1,7 @@
 //! Owns the results of segmentation as plain numbers, and what they warn of.
 
 use super::Rotation;
+use crate::error::{Error, Result};
 use crate::measure::morphometry::Morphometry;
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +49,9 @@ pub struct SegmentSummary {
     /// On request only.
     #[serde(default)]
     pub morphometry: Option<Morphometry>,
+    /// How the threshold was chosen, where that is not plain.
+    #[serde(default)]
+    pub notes: Vec<String>,
     pub warnings: Vec<String>,
 }
 
@@ -89,12 +93,8 @@ pub(super) fn warnings(s: &SegmentSummary) -> Vec<String> {
             100.0 * s.removed_voxels as f64 / (s.removed_voxels + s.bone_voxels) as f64
         ));
     }
-    if s.bv_tv > 0.95 {
-        found.push(format!(
-            "BV/TV is {:.3}: nearly everything was selected",
-            s.bv_tv
-        ));
-    }
+    found.extend(implausible_bv_tv(s));
+    found.extend(implausible_voxels(s.spacing_mm));
     if s.rotation
         .and_then(|r| r.mil_ratio)
         .is_some_and(|ratio| ratio < CLEAR_RATIO)
@@ -114,4 +114,90 @@ pub(super) fn warnings(s: &SegmentSummary) -> Vec<String> {
         }
     }
     found
+}
+
+/// BV/TV of trabecular bone lies between about 5 and 50 %.
+fn implausible_bv_tv(s: &SegmentSummary) -> Option<String> {
+    let slip = match s.threshold.as_str() {
+        "labels" => "check the labels and the volume of interest",
+        _ => "check the threshold and its unit (bonepd-ct info), and the volume of interest",
+    };
+    let percent = 100.0 * s.bv_tv;
+    match s.bv_tv {
+        v if v > 0.95 => Some(format!(
+            "BV/TV is {v:.3}: nearly everything was selected; {slip}"
+        )),
+        v if v > 0.7 => Some(format!(
+            "BV/TV is {percent:.0} %, more than trabecular bone has (2 to 70 %): {slip}"
+        )),
+        v if v < 0.02 => Some(format!(
+            "BV/TV is {percent:.2} %, less than trabecular bone has (2 to 70 %): {slip}"
+        )),
+        _ => None,
+    }
+}
+
+/// Edges of voxels that a scan of trabecular bone may have.
+const VOXEL_MM: [f64; 2] = [0.001, 0.5];
+/// A voxel longer than this times its width is no cube by far.
+const LONG: f64 = 3.0;
+
+/// Warns of voxel sizes that no scan of trabecular bone has, with the likely slip.
+pub fn implausible_voxels(spacing_mm: [f64; 3]) -> Vec<String> {
+    let [low, high] = VOXEL_MM;
+    let mut found = Vec::new();
+    if let Some(edge) = spacing_mm.into_iter().find(|h| !(low..=high).contains(h)) {
+        let slip = likely(edge).map_or(String::new(), |mm| format!(": {mm} mm instead of {edge}?"));
+        found.push(format!(
+            "voxels of {edge} mm are outside {low} to {high} mm{slip} Give --spacing if the file is wrong"
+        ));
+    }
+    let [least, largest] =
+        [f64::min, f64::max].map(|f| spacing_mm.into_iter().reduce(f).unwrap_or(1.0));
+    if largest > LONG * least {
+        let [x, y, z] = spacing_mm;
+        found.push(format!(
+            "voxels of {x} × {y} × {z} mm are {:.1} times as long as wide: check the distance of the slices (--spacing). Struts are not resolved along the long edge, and solves take long; --resample makes cubes",
+            largest / least
+        ));
+    }
+    found
+}
+
+/// The size that was likely meant: of micrometres or metres written as millimetres.
+fn likely(edge_mm: f64) -> Option<f64> {
+    let [low, high] = VOXEL_MM;
+    let rounded = |mm: f64| (mm * 1e9).round() / 1e9;
+    [1e-3, 1e3, 1e6]
+        .map(|factor| rounded(edge_mm * factor))
+        .into_iter()
+        .find(|mm| (low..=high).contains(mm))
+}
+
+/// Refuses voxels whose volumes are beyond any scan's by more than a thousand times.
+///
+/// # Errors
+/// With the size that was likely meant.
+pub fn refuse_impossible_voxels(spacing_mm: [f64; 3]) -> Result<()> {
+    let volume: f64 = spacing_mm.iter().product();
+    let [low, high] = VOXEL_MM.map(|h: f64| h.powi(3));
+    if volume < 1000.0 * high && volume > low / 1000.0 {
+        return Ok(());
+    }
+    let meant = spacing_mm.map(likely);
+    let slip = match meant {
+        [Some(x), Some(y), Some(z)] if x == y && y == z => {
+            format!("{x} mm instead of {}? ", spacing_mm[0])
+        }
+        [Some(x), Some(y), Some(z)] => format!("{x} × {y} × {z} mm? "),
+        _ => String::new(),
+    };
+    Err(Error::setting(
+        "spacing",
+        format!(
+            "voxels of {} × {} × {} mm are no scan's of trabecular bone (0.001 to 0.5 mm): volumes would be wrong by more than a thousand times. {slip}",
+            spacing_mm[0], spacing_mm[1], spacing_mm[2]
+        ),
+        "give the size in millimetres with --spacing (for example --spacing 0.0195)",
+    ))
 }

@@ -7,7 +7,7 @@ use super::conduction::CONDUCTED;
 use super::setup::Setup;
 use super::solid::{DISPLACEMENT, Solid};
 use super::steady::loads;
-use super::{Conduction, Elasticity, Molecular, fracture, unused};
+use super::{Conduction, Elasticity, Molecular, Problem, fracture, unused};
 use crate::error::{Error, Result};
 use crate::scene::setting::{Inputs, Setting};
 
@@ -15,7 +15,7 @@ use crate::scene::setting::{Inputs, Setting};
 /// Whatever a run would refuse before its first solution.
 pub fn check(scene: &Setting, model: &Molecular, inputs: &Inputs) -> Result<()> {
     numbers::check(scene, model)?;
-    unused::refuse(scene, model)?;
+    unused::check(scene, model)?;
     if let Some(time) = &scene.time {
         time.steps()?;
     }
@@ -33,16 +33,16 @@ pub fn check(scene: &Setting, model: &Molecular, inputs: &Inputs) -> Result<()> 
 
 /// Checks one value of what is swept.
 fn one(scene: &Setting, model: &Molecular, setup: &Setup, inputs: &Inputs) -> Result<()> {
-    let turns = match &model.elasticity {
+    let turns = match model.problem.elasticity() {
         None => false,
         Some(e) => e.turns(&setup.micromoduli(e, &e.tensor(inputs)?)?),
     };
     components::check(scene, model, turns)?;
     maps(scene, model, turns)?;
-    if let Some(conduction) = &model.conduction {
+    if let Some(conduction) = model.problem.conduction() {
         conducting(scene, model, conduction, setup)?;
     }
-    match &model.elasticity {
+    match model.problem.elasticity() {
         None => Ok(()),
         Some(e) if turns => elastic::<3>(scene, model, e, setup, inputs),
         Some(e) => elastic::<2>(scene, model, e, setup, inputs),
@@ -58,9 +58,11 @@ fn elastic<const D: usize>(
 ) -> Result<()> {
     let tensor = elasticity.tensor(inputs)?;
     let solid = Solid::<D>::new(scene, model, elasticity, &tensor, setup)?;
-    match &model.fracture {
-        Some(params) => fracture::start::check(scene, model, params, &solid, setup),
-        None => {
+    match &model.problem {
+        Problem::Fracture {
+            fracture: params, ..
+        } => fracture::start::check(scene, model, params, &solid, setup),
+        _ => {
             let names: [&[&str]; D] = std::array::from_fn(|d| DISPLACEMENT[d]);
             loads(scene, model, setup, names, 1.0).map(|_| ())
         }
@@ -76,7 +78,8 @@ fn conducting(
     setup.conductor(model, conduction)?;
     let held = setup.held(scene, model, CONDUCTED, 0.0, None)?;
     loads(scene, model, setup, CONDUCTED, 0.0)?;
-    if conduction.capacity.is_none() && held.iter().all(Option::is_none) {
+    let steady = !matches!(model.problem, Problem::Transient(_));
+    if steady && held.iter().all(Option::is_none) {
         return Err(Error::setting(
             "hold",
             "nothing holds the temperature or potential of a steady scene",
@@ -88,19 +91,18 @@ fn conducting(
 
 /// Names of the scalar fields that a scene writes, the first of them drawn by default.
 fn scalars(model: &Molecular, turns: bool) -> Vec<&'static str> {
-    let mut names = match (&model.elasticity, &model.fracture, &model.vibration) {
-        (None, ..) => vec!["temperature"],
-        (_, Some(_), _) => vec!["damage"],
-        (_, _, Some(_)) => vec!["magnitude"],
-        _ => vec!["energy", "stress_xx", "stress_yy", "stress_xy"],
-    };
-    if model.fracture.is_some() && model.conduction.is_some() {
-        names.push("potential");
+    match &model.problem {
+        Problem::Steady(_) | Problem::Transient(_) => vec!["temperature"],
+        Problem::Fracture {
+            conduction: None, ..
+        } => vec!["damage"],
+        Problem::Fracture { .. } => vec!["damage", "potential"],
+        Problem::Vibration { .. } => vec!["magnitude"],
+        Problem::Static { .. } if turns => {
+            vec!["rotation", "energy", "stress_xx", "stress_yy", "stress_xy"]
+        }
+        Problem::Static { .. } => vec!["energy", "stress_xx", "stress_yy", "stress_xy"],
     }
-    if turns && names[0] == "energy" {
-        names.insert(0, "rotation");
-    }
-    names
 }
 
 /// # Errors

@@ -1,11 +1,11 @@
 //! Owns conduction of heat and of charge: steady, transient, and through a body whose bonds break.
 
 use super::equilibrium::{Factorised, factorise, right_hand_side, solve};
-use super::path::stranded;
+use super::path::isolated;
 use super::setup::Setup;
 use super::steady::{loads, scalar, summary};
-use super::{Conduction, Molecular};
-use crate::error::Result;
+use super::{Molecular, Steady, Transient};
+use crate::error::{Error, Result};
 use crate::operator::Operator;
 use crate::physics::continuum_molecular::body::Body;
 use crate::scene::conditions::Time;
@@ -14,44 +14,59 @@ use crate::scene::setting::Setting;
 
 pub const CONDUCTED: [&[&str]; 1] = [&["temperature", "potential"]];
 
-/// Steady or transient conduction.
-pub fn conduct(
+/// Time at which schedules of a steady scene are read.
+const STEADY: f64 = 1.0;
+
+/// Steady conduction.
+pub fn steady(
     scene: &Setting,
     model: &Molecular,
-    conduction: &Conduction,
+    steady: &Steady,
     setup: &Setup,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    let (body, k) = setup.conductor(model, conduction)?;
-    match (&scene.time, conduction.capacity) {
-        (Some(time), Some(capacity)) => {
-            let mut transient = Transient::new(scene, model, setup, body, capacity, time.step)?;
-            let start = vec![conduction.initial; setup.points.len()];
-            transient.run(scene, model, setup, &k, start, observer)
-        }
-        _ => {
-            observer.start(&setup.points, 1)?;
-            let t = scene.time.as_ref().map_or(1.0, |time| time.end);
-            let held = setup.held(scene, model, CONDUCTED, t, None)?;
-            let force = loads(scene, model, setup, CONDUCTED, t)?;
-            let (x, unknowns) = solve(&body, &setup.points, &held, &force)?;
-            let frame = conducted(model, conduction, setup, &body, &k, &x, t);
-            observer.frame(&frame)?;
-            let stored = body.bond_values();
-            Ok(summary(setup, unknowns, stored, 1, frame.numbers))
-        }
-    }
+    let (body, k) = setup.conductor(model, &steady.conduction)?;
+    observer.start(&setup.points, 1)?;
+    let held = setup.held(scene, model, CONDUCTED, STEADY, None)?;
+    let force = loads(scene, model, setup, CONDUCTED, STEADY)?;
+    let (x, unknowns) = solve(&body, &setup.points, &held, &force)?;
+    let frame = conducted(model, steady, setup, &body, &k, &x);
+    observer.frame(&frame)?;
+    let stored = body.bond_values();
+    Ok(summary(setup, unknowns, stored, 1, frame.numbers))
+}
+
+/// Transient conduction.
+pub fn transient(
+    scene: &Setting,
+    model: &Molecular,
+    params: &Transient,
+    setup: &Setup,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    let (body, k) = setup.conductor(model, &params.conduction)?;
+    let time = marching(scene)?;
+    let mut solver = TimeStepper::new(scene, model, setup, body, params.capacity, time.step)?;
+    let start = vec![params.initial; setup.points.len()];
+    solver.run(scene, model, setup, &k, start, observer)
+}
+
+/// # Errors
+/// A scene without time.
+fn marching(scene: &Setting) -> Result<&Time> {
+    let advice = "add [time] with end and step";
+    let missing = || Error::setting("time", "a transient scene without time", advice);
+    scene.time.as_ref().ok_or_else(missing)
 }
 
 /// Numbers and fields of a temperature or potential.
 fn conducted(
     model: &Molecular,
-    conduction: &Conduction,
+    steady: &Steady,
     setup: &Setup,
     body: &Body<1>,
     k: &[f64],
     x: &[[f64; 1]],
-    t: f64,
 ) -> Frame {
     let values: Vec<f64> = x.iter().map(|v| v[0]).collect();
     let largest = values.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
@@ -72,7 +87,7 @@ fn conducted(
         let error = errors.fold(0.0_f64, |m, e| if m >= e { m } else { e });
         numbers.push(("largest_difference_from_known_field".into(), error));
     }
-    if let Some(probes) = conduction.probes {
+    if let Some(probes) = steady.probes {
         numbers.push(("potential_drop".into(), drop(setup, probes, &values)));
     }
     let fields = vec![
@@ -83,7 +98,7 @@ fn conducted(
         },
     ];
     Frame {
-        time: t,
+        time: STEADY,
         numbers,
         fields,
     }
@@ -113,7 +128,7 @@ pub fn flux(setup: &Setup, body: &Body<1>, k: &[f64], t: &[f64]) -> Vec<[f64; 2]
 /// Transient conduction by the trapezoidal rule: (C/Δt + A/2) ΔT = -A T - A ΔT_held/2 + f. It keeps a jump swinging from
 /// step to step, so each of the first steps is two halves by the implicit Euler rule, which damps it and has the same
 /// matrix, (2C/Δt + A) ΔT = -A T - A ΔT_held + f; the order stays two (R. Rannacher, Numer. Math. 43 (1984) 309-327).
-pub struct Transient {
+pub struct TimeStepper {
     body: Body<1>,
     factorised: Factorised,
     step: f64,
@@ -123,7 +138,7 @@ pub struct Transient {
 /// Steps by the implicit Euler rule.
 const DAMPED: usize = 2;
 
-impl Transient {
+impl TimeStepper {
     pub fn new(
         scene: &Setting,
         model: &Molecular,
@@ -145,7 +160,7 @@ impl Transient {
         let extra = vec![capacity * setup.cell / step; setup.points.len()];
         let factorised = factorise(&body, &setup.points, &held, &extra, &[])?;
         body.blocks = whole;
-        Ok(Transient {
+        Ok(TimeStepper {
             body,
             factorised,
             step,
@@ -209,7 +224,7 @@ impl Transient {
         start: Vec<f64>,
         observer: &mut dyn Observer,
     ) -> Result<Summary> {
-        let steps = scene.time.as_ref().map_or(Ok(1), Time::steps)? as usize;
+        let steps = marching(scene)?.steps()? as usize;
         observer.start(&setup.points, steps)?;
         let mut held = setup.held(scene, model, CONDUCTED, 0.0, None)?;
         let mut x: Vec<[f64; 1]> = start
@@ -266,11 +281,11 @@ pub fn potential(
 ) -> Result<(Vec<f64>, usize)> {
     let held = setup.held(scene, model, CONDUCTED, t, None)?;
     let force = loads(scene, model, setup, CONDUCTED, t)?;
-    let stranded = stranded(&setup.family, broken, &held, &force);
+    let isolated = isolated(&setup.family, broken, &held, &force);
     let mut factorised = factorise(body, &setup.points, &held, &[], &[])?;
     let mut q = right_hand_side(body, &factorised, &held, &force);
     factorised.llt.solve(&mut q);
     let x: Vec<[f64; 1]> = factorised.expand(&q, &held);
-    let value = |(x, stranded): (&[f64; 1], bool)| if stranded { f64::NAN } else { x[0] };
-    Ok((x.iter().zip(stranded).map(value).collect(), q.len()))
+    let value = |(x, isolated): (&[f64; 1], bool)| if isolated { f64::NAN } else { x[0] };
+    Ok((x.iter().zip(isolated).map(value).collect(), q.len()))
 }

@@ -5,8 +5,8 @@
 //! instead of being halved until it is near. Work, elastic energy, the energy of broken bonds and the energy given up
 //! while the body moves to its new equilibrium at constant load are counted separately and must balance.
 
-mod kept;
 mod report;
+mod saved_state;
 pub mod start;
 mod watch;
 
@@ -31,7 +31,7 @@ struct Ledger {
     relaxed: f64,
 }
 
-struct Front<'a, const D: usize> {
+struct CrackGrowth<'a, const D: usize> {
     scene: &'a Setting,
     model: &'a Molecular,
     params: &'a Fracture,
@@ -40,7 +40,7 @@ struct Front<'a, const D: usize> {
     /// Critical energy of each bond of the stencil.
     critical: Vec<f64>,
     /// Points at which bonds never break.
-    sound: Vec<bool>,
+    unbreakable: Vec<bool>,
     crack: Crack,
     /// One flag per listed bond.
     broken: Vec<bool>,
@@ -51,12 +51,12 @@ struct Front<'a, const D: usize> {
     conductor: Option<Body<1>>,
     window: Window<D>,
     bonds: Vec<WindowBond>,
-    /// Under unit load, as of the last look at the whole body: renewed before every use.
+    /// Under unit load, as of the last update of the whole body: renewed before every use.
     x: Vec<[f64; D]>,
     /// Largest energy ratio outside the window then, under unit load, and whether bonds have broken since.
-    far: f64,
+    max_ratio_outside: f64,
     stale: bool,
-    /// The load step under way, and the events in it since the last look at the whole body.
+    /// The load step under way, and the events in it since the last update of the whole body.
     step: usize,
     events: usize,
     lambda: f64,
@@ -74,8 +74,8 @@ struct Front<'a, const D: usize> {
     potential_unknowns: usize,
 }
 
-/// Events at constant load between looks at the whole body.
-const LOOK: usize = 25;
+/// Events at constant load between updates of the whole body.
+const EVENTS_BETWEEN_UPDATES: usize = 25;
 
 /// Runs a scene with fracture to the end of its load, or until a stop region is reached.
 pub fn run<const D: usize>(
@@ -90,35 +90,35 @@ pub fn run<const D: usize>(
     let steps = time.steps()? as usize;
     solid.held = start::unit_load(scene, setup, &solid, time.end)?;
     observer.start(&setup.points, steps)?;
-    let mut front = Front::new(scene, model, params, solid, setup)?;
+    let mut growth = CrackGrowth::new(scene, model, params, solid, setup)?;
     observer.say(&format!(
         "bonds never break at {} of {} points, unbreakable or held in some component",
-        front.sound_points(),
+        growth.unbreakable_points(),
         setup.points.len()
     ));
     match observer.resume()? {
         Some(state) => {
-            front.restore(&state)?;
-            observer.say(&format!("goes on at a load of {:.6}", front.lambda));
+            growth.restore(&state)?;
+            observer.say(&format!("resumed at a load of {:.6}", growth.lambda));
         }
-        None => front.record(observer, true, false)?,
+        None => growth.record(observer, true, false)?,
     }
-    while front.step <= steps && !front.crack.stopped {
-        front.load_to(time.step * front.step as f64, observer)?;
-        let last = front.step == steps || front.crack.stopped;
-        front.record(observer, true, last)?;
-        (front.step, front.events) = (front.step + 1, 0);
+    while growth.step <= steps && !growth.crack.stopped {
+        growth.load_to(time.step * growth.step as f64, observer)?;
+        let last = growth.step == steps || growth.crack.stopped;
+        growth.record(observer, true, last)?;
+        (growth.step, growth.events) = (growth.step + 1, 0);
     }
-    if front.unsettled > 0 {
+    if growth.unsettled > 0 {
         observer.say(&format!(
             "{} of {} solves about the crack front did not converge: take a smaller batch",
-            front.unsettled, front.solves
+            growth.unsettled, growth.solves
         ));
     }
-    Ok(front.summary(steps))
+    Ok(growth.summary(steps))
 }
 
-impl<const D: usize> Front<'_, D> {
+impl<const D: usize> CrackGrowth<'_, D> {
     /// Raises the load to `target`, breaking bonds on the way.
     fn load_to(&mut self, target: f64, observer: &mut dyn Observer) -> Result<()> {
         while !self.crack.stopped {
@@ -137,19 +137,19 @@ impl<const D: usize> Front<'_, D> {
             let near = ratios.iter().fold(0.0_f64, |m, r| m.max(*r));
             // Rounding must not keep a bond that broke its limit at this very load.
             let running = self.lambda * self.lambda * near >= 1.0 - 1e-9;
-            // Far from the front ratios change slowly: while the front is well ahead, looking now and then will do.
-            let reaches = near.max(self.far) * target * target >= 1.0;
-            let close = 2.0 * self.far > near || !reaches;
-            if self.stale && (self.events >= LOOK || (!running && close)) {
-                self.look();
+            // Far from the front ratios change slowly: while the front is well ahead, an update now and then will do.
+            let reaches = near.max(self.max_ratio_outside) * target * target >= 1.0;
+            let close = 2.0 * self.max_ratio_outside > near || !reaches;
+            if self.stale && (self.events >= EVENTS_BETWEEN_UPDATES || (!running && close)) {
+                self.update_whole_body();
                 self.events = 0;
             }
-            let largest = near.max(self.far);
+            let largest = near.max(self.max_ratio_outside);
             if target * target * largest < 1.0 && !running {
                 self.advance(target);
                 return Ok(());
             }
-            if self.far > near && self.far * target * target >= 1.0 {
+            if self.max_ratio_outside > near && self.max_ratio_outside * target * target >= 1.0 {
                 self.look_and_move()?;
                 continue;
             }
@@ -166,7 +166,7 @@ impl<const D: usize> Front<'_, D> {
     }
 
     fn look_and_move(&mut self) -> Result<()> {
-        self.look();
+        self.update_whole_body();
         self.move_window()
     }
 

@@ -5,6 +5,7 @@ pub mod check;
 pub mod conduction;
 pub mod crack;
 pub mod equilibrium;
+mod file;
 pub mod fracture;
 pub mod modes;
 mod path;
@@ -22,56 +23,133 @@ use crate::physics::continuum_molecular::tensor::{Plane, PlaneTensor};
 use crate::scene::conditions::Region;
 use crate::scene::frame::{Observer, Summary};
 use crate::scene::setting::{Inputs, Setting};
+use file::MolecularFile;
 use serde::{Deserialize, Serialize};
 
-/// The table `[physics.continuum-molecular]`. A physics that is left out costs nothing.
+/// The table `[physics.continuum-molecular]`, which [`file`] reads.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "MolecularFile", into = "MolecularFile")]
 pub struct Molecular {
-    #[serde(default)]
-    pub elasticity: Option<Elasticity>,
-    #[serde(default)]
-    pub conduction: Option<Conduction>,
-    #[serde(default)]
-    pub fracture: Option<Fracture>,
-    #[serde(default)]
-    pub vibration: Option<Vibration>,
+    pub problem: Problem,
     /// Segments `[x0, y0, x1, y1]` that cut the bonds they cross: pre-cracks, slits.
-    #[serde(default)]
     pub cracks: Vec<[f64; 4]>,
     /// Regions held at a known field, for boundary layers.
-    #[serde(default)]
     pub known: Vec<Known>,
     /// Out-of-plane thickness; loads and energies are in proportion.
-    #[serde(default = "one")]
     pub thickness: f64,
     /// The volume method for surfaces: bonds of incomplete families are stiffened by 2 V0/(Vp + Vq).
-    #[serde(default = "yes")]
     pub correct_surfaces: bool,
     /// Run once for each of several values of one parameter.
-    #[serde(default)]
     pub sweep: Option<sweep::Sweep>,
 }
 
-/// Plane elasticity: exactly one of `moduli`, `young` with `poisson`, `tetrachiral`, `from_scan`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
-#[serde(deny_unknown_fields, default)]
+/// What is solved, with the physics that it needs and no other.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Problem {
+    /// Elastic equilibrium.
+    Static {
+        elasticity: Elasticity,
+        thermal: Option<Thermal>,
+    },
+    /// Fracture under a growing load; broken bonds stop conducting, where the body conducts.
+    Fracture {
+        elasticity: Elasticity,
+        fracture: Fracture,
+        conduction: Option<Steady>,
+    },
+    Vibration {
+        elasticity: Elasticity,
+        vibration: Vibration,
+    },
+    Steady(Steady),
+    /// Transient conduction.
+    Transient(Transient),
+}
+
+/// Steady conduction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Steady {
+    pub conduction: Conduction,
+    /// Two positions whose potential difference is recorded.
+    pub probes: Option<[[f64; 2]; 2]>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transient {
+    pub conduction: Conduction,
+    /// Heat capacity per volume.
+    pub capacity: f64,
+    /// Temperature at time 0.
+    pub initial: f64,
+}
+
+impl Problem {
+    pub fn elasticity(&self) -> Option<&Elasticity> {
+        match self {
+            Problem::Static { elasticity, .. }
+            | Problem::Fracture { elasticity, .. }
+            | Problem::Vibration { elasticity, .. } => Some(elasticity),
+            Problem::Steady(_) | Problem::Transient(_) => None,
+        }
+    }
+
+    pub fn conduction(&self) -> Option<&Conduction> {
+        match self {
+            Problem::Fracture { conduction, .. } => conduction.as_ref().map(|c| &c.conduction),
+            Problem::Steady(steady) => Some(&steady.conduction),
+            Problem::Transient(transient) => Some(&transient.conduction),
+            Problem::Static { .. } | Problem::Vibration { .. } => None,
+        }
+    }
+
+    /// Turns the material's first axis to `angle_deg`.
+    fn turn(&mut self, angle_deg: f64) {
+        match self {
+            Problem::Static { elasticity, .. } | Problem::Vibration { elasticity, .. } => {
+                elasticity.angle_deg = angle_deg;
+            }
+            Problem::Fracture {
+                elasticity,
+                conduction,
+                ..
+            } => {
+                elasticity.angle_deg = angle_deg;
+                if let Some(steady) = conduction {
+                    steady.conduction.angle_deg = angle_deg;
+                }
+            }
+            Problem::Steady(steady) => steady.conduction.angle_deg = angle_deg,
+            Problem::Transient(transient) => transient.conduction.angle_deg = angle_deg,
+        }
+    }
+}
+
+/// Plane elasticity.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Elasticity {
-    /// C1111, C2222, C1122, C1212, C1112, C2212 in the material's axes.
-    pub moduli: Option<[f64; 6]>,
-    pub young: Option<f64>,
-    pub poisson: Option<f64>,
-    pub tetrachiral: Option<TetrachiralParams>,
-    /// A 6 x 6 apparent stiffness cut to a plane.
-    pub from_scan: Option<FromScan>,
-    /// Of `young` and `from_scan`; plane stress where it is left out.
-    pub plane: Option<Plane>,
+    pub material: Material,
     /// Angle of the material's first axis.
     pub angle_deg: f64,
     /// Make the stencil store the exact energy of a homogeneous strain.
     pub calibrated: bool,
     pub bending: Option<Bending>,
-    pub thermal: Option<Thermal>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Material {
+    /// C1111, C2222, C1122, C1212, C1112, C2212 in the material's axes.
+    Moduli([f64; 6]),
+    Isotropic {
+        young: f64,
+        poisson: f64,
+        plane: Plane,
+    },
+    Tetrachiral(TetrachiralParams),
+    /// A 6 x 6 apparent stiffness cut to a plane.
+    FromScan {
+        scan: FromScan,
+        plane: Plane,
+    },
 }
 
 /// The tetrachiral block lattice of eqs. 86-90.
@@ -114,27 +192,15 @@ pub struct Thermal {
 }
 
 /// Heat or electric conduction.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Conduction {
     /// K11, K22, K12 in the material's axes.
     pub conductivity: [f64; 3],
-    #[serde(default)]
     pub angle_deg: f64,
     /// Even exponent of the angular law (eq. 163).
-    #[serde(default = "two")]
     pub exponent: u32,
     /// Make the stencil conduct a linear field exactly.
-    #[serde(default)]
     pub calibrated: bool,
-    /// Heat capacity per volume; with `time`, the scene is transient.
-    #[serde(default)]
-    pub capacity: Option<f64>,
-    #[serde(default)]
-    pub initial: f64,
-    /// Two positions whose potential difference is recorded.
-    #[serde(default)]
-    pub probes: Option<[[f64; 2]; 2]>,
 }
 
 /// Brittle fracture by the energy criterion.
@@ -198,9 +264,6 @@ pub enum KnownField {
     Polynomial(Vec<[f64; 3]>),
 }
 
-fn one() -> f64 {
-    1.0
-}
 fn tenth() -> f64 {
     0.1
 }
@@ -244,18 +307,22 @@ fn solve(
     let setup = setup::Setup::new(scene, model, inputs)?;
     let warnings = warnings::negative(model, &setup, inputs)?;
     warnings.iter().for_each(|words| observer.warn(words));
-    let solved = match (&model.elasticity, &model.conduction) {
-        (Some(elasticity), _) => {
+    let solved = match &model.problem {
+        Problem::Steady(steady) => conduction::steady(scene, model, steady, &setup, observer),
+        Problem::Transient(transient) => {
+            conduction::transient(scene, model, transient, &setup, observer)
+        }
+        Problem::Static { elasticity, .. }
+        | Problem::Fracture { elasticity, .. }
+        | Problem::Vibration { elasticity, .. } => {
             let tensor = elasticity.tensor(inputs)?;
             match elasticity.turns(&setup.micromoduli(elasticity, &tensor)?) {
                 true => elastic::<3>(scene, model, elasticity, &tensor, &setup, observer),
                 false => elastic::<2>(scene, model, elasticity, &tensor, &setup, observer),
             }
         }
-        (None, Some(conduction)) => conduction::conduct(scene, model, conduction, &setup, observer),
-        (None, None) => unreachable!("refused by the check"),
     };
-    solved.map_err(|error| warnings::blame(error, &warnings))
+    solved.map_err(|error| warnings::with_warnings(error, &warnings))
 }
 
 fn elastic<const D: usize>(
@@ -267,9 +334,11 @@ fn elastic<const D: usize>(
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     let solid = solid::Solid::<D>::new(scene, model, elasticity, tensor, setup)?;
-    match (&model.vibration, &model.fracture) {
-        (Some(vibration), _) => modes::run(solid, vibration, setup, observer),
-        (None, Some(fracture)) => fracture::run(scene, model, fracture, solid, setup, observer),
-        (None, None) => steady::deform(scene, model, elasticity, tensor, solid, setup, observer),
+    match &model.problem {
+        Problem::Vibration { vibration, .. } => modes::run(solid, vibration, setup, observer),
+        Problem::Fracture { fracture, .. } => {
+            fracture::run(scene, model, fracture, solid, setup, observer)
+        }
+        _ => steady::deform(scene, model, tensor, solid, setup, observer),
     }
 }

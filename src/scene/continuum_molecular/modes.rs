@@ -68,7 +68,7 @@ pub fn run<const D: usize>(
     let mut numbers = Vec::new();
     let count = found.modes.len();
     if !found.settled {
-        observer.say("the modes did not settle: ask for fewer, or take them with a grain of salt");
+        observer.say("the modes did not converge: ask for fewer; those given are approximate");
     }
     if count < vibration.modes {
         observer.say(&format!(

@@ -4,13 +4,13 @@ use crate::discretisation::plane::family::Family;
 
 /// Points of pieces, as intact bonds join them, that take up a current and nowhere hold a potential: theirs has no bound.
 /// `held` and `force` are by point, `broken` by listed bond.
-pub fn stranded(
+pub fn isolated(
     family: &Family,
     broken: &[bool],
     held: &[Option<f64>],
     force: &[[f64; 1]],
 ) -> Vec<bool> {
-    let mut stranded = vec![false; held.len()];
+    let mut isolated = vec![false; held.len()];
     let mut seen = vec![false; held.len()];
     let largest = force.iter().fold(0.0_f64, |m, f| m.max(f[0].abs()));
     for start in 0..held.len() {
@@ -31,10 +31,10 @@ pub fn stranded(
         }
         let current: f64 = piece.iter().map(|&p| force[p][0]).sum();
         if piece.iter().all(|&p| held[p].is_none()) && current.abs() > 1e-12 * largest {
-            piece.iter().for_each(|&p| stranded[p] = true);
+            piece.iter().for_each(|&p| isolated[p] = true);
         }
     }
-    stranded
+    isolated
 }
 
 #[cfg(test)]
@@ -57,12 +57,12 @@ mod tests {
         let intact = vec![false; broken.len()];
         let held = [Some(0.0), None, None, None];
         let force = [[0.0], [0.0], [0.0], [1.0]];
-        assert_eq!(stranded(&family, &intact, &held, &force), [false; 4]);
+        assert_eq!(isolated(&family, &intact, &held, &force), [false; 4]);
         let half = [false, false, true, true];
-        assert_eq!(stranded(&family, &broken, &held, &force), half);
+        assert_eq!(isolated(&family, &broken, &held, &force), half);
         let both = [Some(0.0), None, Some(1.0), None];
-        assert_eq!(stranded(&family, &broken, &both, &force), [false; 4]);
+        assert_eq!(isolated(&family, &broken, &both, &force), [false; 4]);
         let round = [[0.0], [0.0], [-1.0], [1.0]];
-        assert_eq!(stranded(&family, &broken, &held, &round), [false; 4]);
+        assert_eq!(isolated(&family, &broken, &held, &round), [false; 4]);
     }
 }

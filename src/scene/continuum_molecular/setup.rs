@@ -38,8 +38,9 @@ impl Setup {
             });
         }
         let mut layer = vec![None; points.len()];
-        for known in &model.known {
-            let chosen = known.region.select(&points, points.len(), "known.region")?;
+        for (k, known) in model.known.iter().enumerate() {
+            let key = format!("known[{k}].region");
+            let chosen = known.region.select(&points, points.len(), &key)?;
             for p in chosen {
                 let here = points.position(p);
                 let bonds = family.stencil.bonds.iter();
@@ -130,10 +131,10 @@ impl Setup {
         let mut held = self.holds(scene, names, t)?;
         let known = self.known::<D>(model, tensor)?;
         for (v, (held, known)) in held.iter_mut().zip(known).enumerate() {
-            if held.is_some() && known.is_some() {
+            if let (Some(_), Some((k, _))) = (*held, known) {
                 let [x, y] = self.points.position(v / D);
                 return Err(Error::setting(
-                    "known.region",
+                    format!("known[{k}].region"),
                     format!(
                         "[[hold]] and known both prescribe {} of the point at [{x}, {y}]",
                         names[v % D].join(" or ")
@@ -141,7 +142,7 @@ impl Setup {
                     "part their regions",
                 ));
             }
-            *held = held.or(known);
+            *held = held.or(known.map(|(_, value)| value));
         }
         Ok(held)
     }
@@ -169,25 +170,23 @@ impl Setup {
         Ok(held)
     }
 
-    /// Values held by `known`.
+    /// Values held by `known`, each with the place in the list of what prescribes it: the last.
     fn known<const D: usize>(
         &self,
         model: &Molecular,
         tensor: Option<&PlaneTensor>,
-    ) -> Result<Vec<Option<f64>>> {
+    ) -> Result<Vec<Option<(usize, f64)>>> {
         let mut held = vec![None; self.points.len() * D];
-        for known in &model.known {
+        for (k, known) in model.known.iter().enumerate() {
             let turn = known.angle_deg.to_radians();
             let tip = tensor.map(|t| CrackTip::new(&t.turned(-turn)));
-            for p in known
-                .region
-                .select(&self.points, self.points.len(), "known.region")?
-            {
+            let key = format!("known[{k}].region");
+            for p in known.region.select(&self.points, self.points.len(), &key)? {
                 let x = self.points.position(p);
                 let values = known_values::<D>(&known.field, x, turn, tip.as_ref());
                 for (d, value) in values.into_iter().enumerate() {
                     if let Some(value) = value {
-                        held[p * D + d] = Some(value);
+                        held[p * D + d] = Some((k, value));
                     }
                 }
             }

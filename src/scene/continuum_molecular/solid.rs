@@ -1,7 +1,7 @@
 //! Owns an elastic body: the moduli of its bonds and what is held of it.
 
 use super::setup::Setup;
-use super::{Bending, Elasticity, Molecular, Thermal};
+use super::{Bending, Elasticity, Molecular, Problem, Thermal};
 use crate::error::Result;
 use crate::physics::continuum_molecular::body::Body;
 use crate::physics::continuum_molecular::bond::{Bond, Deformation, Moduli};
@@ -62,7 +62,10 @@ impl<const D: usize> Solid<D> {
             body,
             moduli,
             held,
-            thermal: elasticity.thermal,
+            thermal: match &model.problem {
+                Problem::Static { thermal, .. } => *thermal,
+                _ => None,
+            },
         })
     }
 

@@ -1,9 +1,9 @@
 //! Owns solutions of elastic bodies without cracks that grow, and what all solutions report.
 
+use super::Molecular;
 use super::equilibrium::solve;
 use super::setup::Setup;
 use super::solid::Solid;
-use super::{Elasticity, Molecular};
 use crate::error::Result;
 use crate::physics::continuum_molecular::tensor::PlaneTensor;
 use crate::scene::frame::{Field, Frame, Observer, Summary, Values};
@@ -40,17 +40,19 @@ pub fn loads<const D: usize>(
     t: f64,
 ) -> Result<Vec<[f64; D]>> {
     let mut force = vec![[0.0; D]; setup.points.len()];
-    for load in &scene.load {
-        load.value.check("load.value")?;
+    for (k, load) in scene.load.iter().enumerate() {
+        load.value.check(&format!("load[{k}].value"))?;
         let Some(d) = names
             .iter()
             .position(|n| n.contains(&load.component.as_str()))
         else {
             continue;
         };
-        let chosen = load
-            .region
-            .select(&setup.points, setup.points.len(), "load.region")?;
+        let chosen = load.region.select(
+            &setup.points,
+            setup.points.len(),
+            &format!("load[{k}].region"),
+        )?;
         let share = load.value.at(t) / (chosen.len() as f64 * model.thickness);
         chosen.into_iter().for_each(|p| force[p][d] += share);
     }
@@ -69,7 +71,6 @@ pub fn displacement<const D: usize>(x: &[[f64; D]], scale: f64) -> Field {
 pub fn deform<const D: usize>(
     scene: &Setting,
     model: &Molecular,
-    elasticity: &Elasticity,
     tensor: &PlaneTensor,
     solid: Solid<D>,
     setup: &Setup,
@@ -79,7 +80,7 @@ pub fn deform<const D: usize>(
     let names: [&[&str]; D] = std::array::from_fn(|d| super::solid::DISPLACEMENT[d]);
     let t = scene.time.as_ref().map_or(1.0, |time| time.end);
     let mut force = loads(scene, model, setup, names, t)?;
-    if elasticity.thermal.is_some() {
+    if solid.thermal.is_some() {
         for (f, extra) in force.iter_mut().zip(thermal_force(&solid, setup)) {
             f.iter_mut().zip(extra).for_each(|(f, e)| *f += e);
         }
@@ -93,7 +94,7 @@ pub fn deform<const D: usize>(
         numbers.push(("energy_density_inside".into(), energy[middle]));
     }
     if let Some([e11, e22, shear]) = strain_of(model) {
-        let [a11, a22, a12] = match (&elasticity.thermal, middle) {
+        let [a11, a22, a12] = match (&solid.thermal, middle) {
             (Some(t), Some(p)) => t.expansion.map(|a| a * t.rise_at(setup.points.position(p))),
             _ => [0.0; 3],
         };
@@ -193,7 +194,7 @@ pub fn summary(
         bonds: setup.bond_count(),
         steps,
         converged: true,
-        pace: None,
+        step_statistics: None,
         numbers,
         stopped: None,
     }

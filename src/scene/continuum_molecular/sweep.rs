@@ -1,6 +1,6 @@
 //! Owns a scene repeated over the values of one parameter.
 
-mod kept;
+mod saved_state;
 
 use super::{KnownField, Molecular};
 use crate::discretisation::plane::Points;
@@ -43,14 +43,7 @@ impl Sweep {
         let mut model = model.clone();
         model.sweep = None;
         match self.parameter {
-            Parameter::Angle => {
-                if let Some(e) = &mut model.elasticity {
-                    e.angle_deg = value;
-                }
-                if let Some(c) = &mut model.conduction {
-                    c.angle_deg = value;
-                }
-            }
+            Parameter::Angle => model.problem.turn(value),
             Parameter::Mixity => {
                 for known in &mut model.known {
                     if let KnownField::CrackTip([k1, k2]) = &mut known.field {
@@ -66,7 +59,7 @@ impl Sweep {
 }
 
 /// Passes nothing on but words and, at the end, the last fields. What is kept of a stopped sweep is its finished values:
-/// the one under way starts anew.
+/// the one under way starts again.
 struct Quiet<'a> {
     inner: &'a mut dyn Observer,
     last: Frame,
@@ -105,7 +98,7 @@ pub fn run(
     let mut warned = Vec::new();
     observer.start(&scene.points(inputs)?, sweep.values.len())?;
     let (mut total, mut finished) = match observer.resume()? {
-        Some(state) => kept::restore(&state)?,
+        Some(state) => saved_state::restore(&state)?,
         None => (
             Summary {
                 converged: true,
@@ -116,7 +109,7 @@ pub fn run(
     };
     if finished > 0 {
         observer.say(&format!(
-            "goes on after {finished} of {} values",
+            "resumed after {finished} of {} values",
             sweep.values.len()
         ));
     }
@@ -141,7 +134,7 @@ pub fn run(
             total.numbers.push((format!("{name}_at_{value}"), number));
         }
         finished += 1;
-        observer.keep(&|| kept::state(&total, finished))?;
+        observer.keep(&|| saved_state::state(&total, finished))?;
     }
     Ok(total)
 }

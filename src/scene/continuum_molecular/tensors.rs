@@ -1,6 +1,6 @@
 //! Owns the tensors of a scene in its own axes.
 
-use super::{Conduction, Elasticity, TetrachiralParams};
+use super::{Conduction, Elasticity, Material, TetrachiralParams};
 use crate::error::{Error, Result};
 use crate::physics::continuum_molecular::conductivity::Conductivity;
 use crate::physics::continuum_molecular::tensor::{Plane, PlaneTensor};
@@ -11,11 +11,13 @@ impl Elasticity {
     /// The stiffness in the scene's axes.
     pub fn tensor(&self, inputs: &Inputs) -> Result<PlaneTensor> {
         let zeta = self.angle_deg.to_radians();
-        let plane = self.plane.unwrap_or_default();
-        let tensor = match (&self.moduli, self.young, &self.tetrachiral, &self.from_scan) {
-            (Some(moduli), None, None, None) => PlaneTensor::from_moduli(*moduli)?,
-            (None, Some(young), None, None) => {
-                let poisson = self.poisson.unwrap_or(0.0);
+        let tensor = match &self.material {
+            Material::Moduli(moduli) => PlaneTensor::from_moduli(*moduli)?,
+            &Material::Isotropic {
+                young,
+                poisson,
+                plane,
+            } => {
                 let (below, why) = match plane {
                     Plane::Strain => (0.5, "an incompressible body has no plane strain"),
                     Plane::Stress => (1.0, "beyond that the plane is unstable"),
@@ -24,8 +26,8 @@ impl Elasticity {
                 between("elasticity.poisson", poisson, -1.0, below, why)?;
                 PlaneTensor::isotropic(young, poisson, plane)?
             }
-            (None, None, Some(t), None) => t.checked()?.tensor()?,
-            (None, None, None, Some(scan)) => {
+            Material::Tetrachiral(t) => t.checked()?.tensor()?,
+            Material::FromScan { scan, plane } => {
                 let six = inputs.stiffness.as_ref().ok_or_else(|| {
                     Error::setting(
                         "elasticity.from_scan.file",
@@ -33,14 +35,7 @@ impl Elasticity {
                         "check its path",
                     )
                 })?;
-                PlaneTensor::cut(six, scan.axes.map(|a| a.index()), plane)?
-            }
-            _ => {
-                return Err(Error::setting(
-                    "elasticity",
-                    "expected exactly one of moduli, young (with poisson), tetrachiral, from_scan",
-                    "keep one",
-                ));
+                PlaneTensor::cut(six, scan.axes.map(|a| a.index()), *plane)?
             }
         };
         Ok(tensor.turned(zeta))

@@ -9,10 +9,10 @@ use crate::scene::setting::Inputs;
 /// What is negative in some direction, a line each.
 pub fn negative(model: &Molecular, setup: &Setup, inputs: &Inputs) -> Result<Vec<String>> {
     let mut words = Vec::new();
-    if let Some(elasticity) = &model.elasticity {
+    if let Some(elasticity) = model.problem.elasticity() {
         elastic(elasticity, setup, inputs, &mut words)?;
     }
-    if let Some(conduction) = &model.conduction {
+    if let Some(conduction) = model.problem.conduction() {
         conducting(conduction, model, setup, &mut words)?;
     }
     Ok(words)
@@ -70,7 +70,7 @@ fn lowest(name: &str, k: &[f64], setup: &Setup, advice: &str) -> Option<String> 
 }
 
 /// The error of a factorisation, with `warnings` as what may be behind it.
-pub fn blame(error: Error, warnings: &[String]) -> Error {
+pub fn with_warnings(error: Error, warnings: &[String]) -> Error {
     match error {
         Error::Specimen { found, advice }
             if !warnings.is_empty() && found.contains("not positive definite") =>

@@ -1,8 +1,8 @@
 //! Owns the moving window about a crack front: the rest of the body is condensed onto its points, so that bonds broken
 //! inside it cost a dense solve of the window alone.
 
-mod kept;
 mod lost;
+mod saved_state;
 
 pub use lost::{WindowBond, opposite};
 

@@ -8,9 +8,9 @@ use crate::physics::growth::Weight;
 use crate::scene::frame::{Frame, Observer, Summary};
 use crate::scene::remodelling::body::{Body, Conditions, NUDGE, nudge, rate_of};
 use crate::scene::remodelling::density::{DensityParams, GrowthParams, Probes};
-use crate::scene::remodelling::march;
-use crate::scene::remodelling::march::{Advance, Marching, march};
-use crate::scene::remodelling::solver::{Equilibrium, SolverParams, Stamp};
+use crate::scene::remodelling::solver::{Equilibrium, FactorOrigin, SolverParams};
+use crate::scene::remodelling::time_loop;
+use crate::scene::remodelling::time_loop::{Advance, Marching, run_time_loop};
 use crate::scene::setting::{Inputs, Setting};
 use crate::scene::state::State;
 use crate::solver::newton::NotConverged;
@@ -49,7 +49,7 @@ pub enum Micromodulus {
 /// Refuses what [`run`] would refuse before its first step.
 pub fn check(scene: &Setting, params: &BondBasedParams, inputs: &Inputs) -> Result<()> {
     Peridynamic::new(scene, params, inputs)?;
-    march::check(scene.marching_time()?)
+    time_loop::check(scene.marching_time()?)
 }
 
 /// Runs the scene.
@@ -66,7 +66,7 @@ pub fn run(
         &scene.points(inputs)?,
         (time.end / time.step).round() as usize,
     )?;
-    march(&mut model, time, &scene.output, observer, &mut summary)?;
+    run_time_loop(&mut model, time, &scene.output, observer, &mut summary)?;
     Ok(summary)
 }
 
@@ -83,7 +83,7 @@ struct Peridynamic {
     begun: bool,
     values: Vec<f64>,
     /// Of the solver's factor.
-    stamp: Option<Stamp>,
+    factor_origin: Option<FactorOrigin>,
 }
 
 impl Peridynamic {
@@ -150,7 +150,7 @@ impl Peridynamic {
             rate: None,
             begun: false,
             values,
-            stamp: None,
+            factor_origin: None,
         })
     }
 
@@ -173,7 +173,7 @@ impl Marching for Peridynamic {
         };
         let old = &self.values[..self.body.material];
         let nudged = nudge(&held, &given);
-        let stamp = |given: &[f64]| Stamp {
+        let factor_origin = |given: &[f64]| FactorOrigin {
             given: given.to_vec(),
             dt: now - before,
             old: old.to_vec(),
@@ -191,7 +191,7 @@ impl Marching for Peridynamic {
         if moved && !self.body.stretch(&mut q, from, now) {
             let (from, to) = (step(&held), step(&nudged));
             if self.solver.predict(&from, &to, NUDGE, &mut q)? {
-                self.stamp = Some(stamp(&held));
+                self.factor_origin = Some(factor_origin(&held));
             }
         }
         let rate = self
@@ -202,7 +202,7 @@ impl Marching for Peridynamic {
         let whole = || self.model.pattern(&self.body.map);
         let advance = self.solver.solve(&step(&given), &mut q, rate, whole)?;
         if advance.factorisations > 0 {
-            self.stamp = Some(stamp(&given));
+            self.factor_origin = Some(factor_origin(&given));
         }
         // What a change of the supports moved does not go on.
         self.rate = (!moved).then(|| rate_of(&self.q, &q, now - before));
@@ -235,7 +235,7 @@ impl Marching for Peridynamic {
             state.put("rate", rate.as_slice());
         }
         self.solver.save(state);
-        self.stamp.iter().for_each(|s| s.save(state));
+        self.factor_origin.iter().for_each(|s| s.save(state));
     }
 
     fn restore(&mut self, state: &State) -> Result<()> {
@@ -244,16 +244,16 @@ impl Marching for Peridynamic {
         self.values = state.array("values", self.values.len())?.to_vec();
         self.begun = true;
         self.rate = state.find("rate").map(<[f64]>::to_vec);
-        self.stamp = Stamp::restore(state, self.values.len())?;
-        let Some(stamp) = &self.stamp else {
+        self.factor_origin = FactorOrigin::restore(state, self.values.len())?;
+        let Some(factor_origin) = &self.factor_origin else {
             return Ok(());
         };
         let step = Step {
             model: &self.model,
             map: &self.body.map,
-            given: &stamp.given,
-            old: &stamp.old,
-            dt: stamp.dt,
+            given: &factor_origin.given,
+            old: &factor_origin.old,
+            dt: factor_origin.dt,
         };
         self.solver.restore(&step, state, n)
     }

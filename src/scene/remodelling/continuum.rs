@@ -11,9 +11,9 @@ use crate::scene::frame::{Frame, Observer, Summary};
 use crate::scene::remodelling::body::{Body, Conditions, NUDGE, nudge, rate_of};
 use crate::scene::remodelling::density::Probes;
 use crate::scene::remodelling::loads::Loads;
-use crate::scene::remodelling::march;
-use crate::scene::remodelling::march::{Advance, Marching, march};
-use crate::scene::remodelling::solver::{Equilibrium, Stamp};
+use crate::scene::remodelling::solver::{Equilibrium, FactorOrigin};
+use crate::scene::remodelling::time_loop;
+use crate::scene::remodelling::time_loop::{Advance, Marching, run_time_loop};
 use crate::scene::setting::{Inputs, Setting};
 use crate::scene::state::State;
 use crate::solver::newton::NotConverged;
@@ -21,7 +21,7 @@ use crate::solver::newton::NotConverged;
 /// Refuses what [`run`] would refuse before its first step.
 pub fn check(scene: &Setting, params: &ContinuumParams, inputs: &Inputs) -> Result<()> {
     Local::new(scene, params, inputs)?;
-    march::check(scene.marching_time()?)
+    time_loop::check(scene.marching_time()?)
 }
 
 /// Runs the scene.
@@ -39,7 +39,7 @@ pub fn run(
         ..Summary::default()
     };
     observer.start(&model.body.points, (time.end / time.step).round() as usize)?;
-    march(&mut model, time, &scene.output, observer, &mut summary)?;
+    run_time_loop(&mut model, time, &scene.output, observer, &mut summary)?;
     Ok(summary)
 }
 
@@ -57,7 +57,7 @@ struct Local {
     values: Vec<f64>,
     old: Old,
     /// Of the solver's factor.
-    stamp: Option<Stamp>,
+    factor_origin: Option<FactorOrigin>,
 }
 
 impl Local {
@@ -124,7 +124,7 @@ impl Local {
             begun: false,
             values,
             old,
-            stamp: None,
+            factor_origin: None,
         })
     }
 
@@ -171,7 +171,7 @@ impl Marching for Local {
         let load = self.loads.at(now, given.len());
         let loads_move = !self.begun || load != self.loads.at(before, given.len());
         let nudged = nudge(&held, &given);
-        let stamp = |given: &[f64]| Stamp {
+        let factor_origin = |given: &[f64]| FactorOrigin {
             given: given.to_vec(),
             dt: now - before,
             old: self.old.flat().to_vec(),
@@ -189,7 +189,7 @@ impl Marching for Local {
         if moved {
             let (from, to) = (step(&held), step(&nudged));
             if self.solver.predict(&from, &to, NUDGE, &mut q)? {
-                self.stamp = Some(stamp(&held));
+                self.factor_origin = Some(factor_origin(&held));
             }
         }
         let steady = !moved && !loads_move;
@@ -201,7 +201,7 @@ impl Marching for Local {
         let whole = || self.model.pattern_from(&self.body.map, 0);
         let advance = self.solver.solve(&step(&given), &mut q, rate, whole)?;
         if advance.factorisations > 0 {
-            self.stamp = Some(stamp(&given));
+            self.factor_origin = Some(factor_origin(&given));
         }
         // What a change of supports or loads moved does not go on.
         self.rate = steady.then(|| rate_of(&self.q, &q, now - before));
@@ -246,7 +246,7 @@ impl Marching for Local {
             state.put("rate", rate.as_slice());
         }
         self.solver.save(state);
-        self.stamp.iter().for_each(|s| s.save(state));
+        self.factor_origin.iter().for_each(|s| s.save(state));
     }
 
     fn restore(&mut self, state: &State) -> Result<()> {
@@ -256,16 +256,16 @@ impl Marching for Local {
         self.old = self.old.like(state.array("old", self.old.flat().len())?);
         self.begun = true;
         self.rate = state.find("rate").map(<[f64]>::to_vec);
-        self.stamp = Stamp::restore(state, self.values.len())?;
-        let Some(stamp) = &self.stamp else {
+        self.factor_origin = FactorOrigin::restore(state, self.values.len())?;
+        let Some(factor_origin) = &self.factor_origin else {
             return Ok(());
         };
         let step = Step {
             model: &self.model,
             map: &self.body.map,
-            given: &stamp.given,
-            old: &self.old.like(&stamp.old),
-            dt: stamp.dt,
+            given: &factor_origin.given,
+            old: &self.old.like(&factor_origin.old),
+            dt: factor_origin.dt,
             load: &[],
         };
         self.solver.restore(&step, state, n)

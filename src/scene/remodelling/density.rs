@@ -230,7 +230,7 @@ pub struct Probes {
 }
 
 impl Probes {
-    /// All points weigh alike.
+    /// All points have the same weight.
     pub fn new(probes: &[Probe], points: &Points) -> Result<Self> {
         Probes::weighted(probes, points, vec![1.0; points.len()])
     }

@@ -5,6 +5,6 @@ pub mod bond_based;
 pub mod continuum;
 pub mod density;
 mod loads;
-mod march;
 pub mod solver;
-mod stride;
+mod step_size;
+mod time_loop;

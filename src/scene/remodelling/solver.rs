@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::operator::nonlinear::Staggered;
 use crate::operator::sparse::Sparse;
-use crate::scene::remodelling::march::Advance;
+use crate::scene::remodelling::time_loop::Advance;
 use crate::scene::state::State;
 use crate::solver::chord::Chord;
 use crate::solver::direct::dissection::nested_dissection;
@@ -59,13 +59,13 @@ const MONOLITHIC: usize = 20_000;
 
 /// The equations a factor belongs to: what was given, the time step, and the densities before it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stamp {
+pub struct FactorOrigin {
     pub given: Vec<f64>,
     pub dt: f64,
     pub old: Vec<f64>,
 }
 
-impl Stamp {
+impl FactorOrigin {
     pub fn save(&self, state: &mut State) {
         state.put("factor.given", self.given.as_slice());
         state.put("factor.dt", [self.dt]);
@@ -73,11 +73,11 @@ impl Stamp {
     }
 
     /// None where the state holds none; `values` is how many are given or not.
-    pub fn restore(state: &State, values: usize) -> Result<Option<Stamp>> {
+    pub fn restore(state: &State, values: usize) -> Result<Option<FactorOrigin>> {
         let Some(old) = state.find("factor.old") else {
             return Ok(None);
         };
-        Ok(Some(Stamp {
+        Ok(Some(FactorOrigin {
             given: state.array("factor.given", values)?.to_vec(),
             dt: state.number("factor.dt")?,
             old: old.to_vec(),
@@ -184,7 +184,10 @@ impl Equilibrium {
         let kind = state.array("factor.kind", 2)?;
         let made = reuse.chord.remake(step, q, [kind[0], kind[1]]);
         made.map_err(|why| {
-            Error::specimen(format!("its kept state: {why}"), "start anew with --force")
+            Error::specimen(
+                format!("its saved state: {why}"),
+                "start from the beginning with --force",
+            )
         })
     }
 }

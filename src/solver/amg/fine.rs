@@ -144,6 +144,12 @@ fn boxes(operator: &impl Coarsen, diagonal: &Diagonal, box_mm: [f64; 3]) -> Vec<
             most
         })
         .reduce(|| [0; 3], |m, c| std::array::from_fn(|a| m[a].max(c[a])));
+    // Frames have at most 2^32 places for sites, and a box is wider than a place.
+    let count = most.iter().map(|n| u128::from(*n) + 1).product::<u128>();
+    assert!(
+        count < u128::from(NONE),
+        "{count} boxes: too many to number"
+    );
     let mut boxes = vec![NONE; sites];
     boxes
         .par_chunks_mut(CHUNK)

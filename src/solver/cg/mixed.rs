@@ -138,7 +138,7 @@ fn residual(
     unit: f64,
     r: &mut [[f32; 3]],
 ) -> State {
-    let take = |first: usize, force: &[[f64; 3]], r: &mut [[f32; 3]]| {
+    let consume = |first: usize, force: &[[f64; 3]], r: &mut [[f32; 3]]| {
         let (mut energy, mut squared) = (0.0, 0.0);
         for (i, (r, f)) in r.iter_mut().zip(force).enumerate() {
             for d in 0..3 {
@@ -152,7 +152,7 @@ fn residual(
         }
         [energy, squared]
     };
-    let [energy, squared] = operator.each_part(u, r, take);
+    let [energy, squared] = operator.for_each_chunk(u, r, consume);
     State {
         energy,
         norm: squared.sqrt(),

@@ -1,4 +1,4 @@
-//! Owns the making of bonds between pieces of bone that touch.
+//! Owns the making of bonds between components of bone that touch.
 
 use super::touching::Touching;
 use super::{Bonds, Component};
@@ -11,7 +11,7 @@ const LEAST_SHARE: f32 = 1e-4;
 /// What bonds are made from.
 pub struct Bonding<'a> {
     pub frame: &'a Frame,
-    pub pieces: &'a [Component],
+    pub components: &'a [Component],
     pub touching: &'a Touching,
 }
 
@@ -19,10 +19,10 @@ pub struct Bonding<'a> {
 const PORTION: usize = 4096;
 
 impl Bonding<'_> {
-    /// The bonds of all pieces: counted first, so that no more is ever held than they need.
+    /// The bonds of all components: counted first, so that no more is ever held than they need.
     pub fn all(&self) -> Bonds {
         let directions = self.directions();
-        let count = self.pieces.len();
+        let count = self.components.len();
         let lengths: Vec<u32> = (0..count)
             .into_par_iter()
             .map_init(Vec::new, |row, p| {
@@ -52,9 +52,9 @@ impl Bonding<'_> {
         }
         portions
             .into_par_iter()
-            .for_each(|(pieces, neighbour, direction, share)| {
+            .for_each(|(components, neighbour, direction, share)| {
                 let (mut row, mut at) = (Vec::new(), 0);
-                for p in pieces {
+                for p in components {
                     self.row(p, &directions, &mut row);
                     for &(end, d, s) in &row {
                         (neighbour[at], direction[at], share[at]) = (end, d, s);
@@ -77,7 +77,7 @@ impl Bonding<'_> {
             .collect()
     }
 
-    /// One piece's bonds: end, direction, share; those to pieces it touches, and those along diagonals past them.
+    /// One component's bonds: end, direction, share; those to components it touches, and those along diagonals past them.
     fn row(&self, p: usize, directions: &[[i32; 3]], row: &mut Vec<(u32, u8, f32)>) {
         row.clear();
         for (q, b) in self.touching.of(p) {
@@ -101,17 +101,17 @@ impl Bonding<'_> {
         let share = (self.along(p, d, 1) * self.along(q, d, -1)).sqrt();
         // Of the cells around the end planes only the half between the planes is under load.
         let axis = self.frame.axis.index();
-        let plane = self.frame.indices(self.pieces[p].cell as usize)[axis];
+        let plane = self.frame.indices(self.components[p].cell as usize)[axis];
         let half = d[axis] == 0 && (plane == 0 || plane == self.frame.planes() as i32 - 1);
         (q as u32, b as u8, if half { 0.5 * share } else { share })
     }
 
-    /// Mean cross-section of a piece's half cell towards (`sign` 1) or against a direction.
+    /// Mean cross-section of a component's half cell towards (`sign` 1) or against a direction.
     fn along(&self, p: usize, d: [i32; 3], sign: i32) -> f32 {
         let axes = (0..3).filter(|&a| d[a] != 0);
         let (sum, n) = axes.fold((0.0, 0.0), |(sum, n), a| {
             let side = usize::from(sign * d[a] > 0);
-            (sum + self.pieces[p].ends[a][side], n + 1.0)
+            (sum + self.components[p].ends[a][side], n + 1.0)
         });
         sum / n
     }

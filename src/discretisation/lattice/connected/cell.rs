@@ -1,4 +1,4 @@
-//! Owns one lattice cell: the connected pieces of its bone, how much there is of each, and what shows on its faces.
+//! Owns one lattice cell: the connected components of its bone, how much there is of each, and what shows on its faces.
 
 use crate::discretisation::lattice::placement::overlaps;
 use crate::grid::Axis;
@@ -9,8 +9,8 @@ pub const NO_PIECE: u16 = u16::MAX;
 
 /// A cell with bone in it.
 pub struct Cell {
-    pub pieces: Vec<Part>,
-    /// Labels (places in `pieces`) of the outermost voxels below and above along each axis.
+    pub components: Vec<Part>,
+    /// Labels (places in `components`) of the outermost voxels below and above along each axis.
     pub first: [Vec<u16>; 3],
     pub last: [Vec<u16>; 3],
 }
@@ -19,12 +19,12 @@ pub struct Cell {
 /// of voxel steps: were it 1, struts of five voxels would be 10 % too stiff; 0 would leave out a whole voxel of each run.
 const END_SHARE: f64 = 0.5;
 
-/// A connected piece of a cell's bone.
+/// A connected component of a cell's bone.
 pub struct Part {
     /// Of the part of the cell that lies between the loaded faces.
     pub fraction: f32,
     /// Share of a whole cross-section along each axis, of the half cell below and above: the harmonic mean over the half
-    /// slices in which the piece is, each of the area that bears toward the slice next to it.
+    /// slices in which the component is, each of the area that bears toward the slice next to it.
     pub ends: [[f32; 2]; 3],
 }
 
@@ -87,7 +87,7 @@ impl Cell {
         extent[load.index()] = spans[load.index()].length.iter().sum();
         let origin = [spans[0].first, spans[1].first, spans[2].first];
         let goes_on = |at: [usize; 3], a: usize, up: bool| goes_on(bone, origin, at, a, up, load);
-        let pieces = measure(&labels, m, count, &spans, extent, goes_on);
+        let components = measure(&labels, m, count, &spans, extent, goes_on);
         let face = |a: usize, at: usize| {
             let place = |i: usize| [i % m[0], i / m[0] % m[1], i / (m[0] * m[1])];
             let on = labels
@@ -99,7 +99,7 @@ impl Cell {
         Some(Cell {
             first: std::array::from_fn(|a| face(a, 0)),
             last: std::array::from_fn(|a| face(a, m[a] - 1)),
-            pieces,
+            components,
         })
     }
 }
@@ -112,7 +112,7 @@ fn label(labels: &mut [u16], m: [usize; 3]) -> usize {
     let mut count = 0;
     let mut queue = Vec::new();
     for seed in 0..labels.len() {
-        // Beyond the largest label (never met: a cell would need 131 068 voxels) the rest counts as one piece.
+        // Beyond the largest label (never met: a cell would need 131 068 voxels) the rest counts as one component.
         if labels[seed] != UNSEEN {
             continue;
         }
@@ -167,7 +167,7 @@ fn measure(
     extent: [f64; 3],
     goes_on: impl Fn([usize; 3], usize, bool) -> bool,
 ) -> Vec<Part> {
-    // Of each piece in every slice along each axis, the area that bears down and up, and the volume.
+    // Of each component in every slice along each axis, the area that bears down and up, and the volume.
     let mut areas: [Vec<[f64; 2]>; 3] = std::array::from_fn(|a| vec![[0.0; 2]; count * m[a]]);
     let mut volumes = vec![0.0; count];
     for (v, &l) in labels.iter().enumerate() {

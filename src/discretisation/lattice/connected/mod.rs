@@ -1,9 +1,9 @@
-//! Owns the graded lattice's sites: the bone in each cell of the lattice, split into its connected pieces.
+//! Owns the sites of a connected lattice: the bone in each cell, split into its connected components.
 //!
 //! A cell coarser than the pores holds bone of several struts. One site for all of it would tie struts together that do
 //! not touch (on phantoms whose struts are one lattice parameter thick, that alone made E_app 30 to 50 % too high). So
-//! every piece of bone that hangs together through voxel faces within its cell is a site of its own, and a bond joins
-//! two pieces only where they touch across the cells' common face, or, along a diagonal, where a third piece touches
+//! every component of bone, connected through voxel faces within its cell, is a site of its own, and a bond joins
+//! two components only where they touch across the cells' common face, or, along a diagonal, where a third component touches
 //! both.
 //!
 //! A bond carries what the bone along it can: of each end the cross-section of the half cell toward the other end, as
@@ -90,21 +90,21 @@ impl Bonds {
     }
 }
 
-/// The pieces that carry load, in the order of their cells.
+/// The components that carry load, in the order of their cells.
 #[derive(Debug, Clone)]
 pub struct ConnectedSites {
     pub frame: Frame,
-    /// Grid indices of each piece's cell.
+    /// Grid indices of each component's cell.
     pub indices: Vec<[i32; 3]>,
-    /// Bone fraction of each piece in its cell.
+    /// Bone fraction of each component in its cell.
     pub fractions: Vec<f32>,
     pub bonds: Bonds,
     pub grips: Grips,
-    /// ConnectedSites without a path of bonds to both grips.
+    /// Components without a path of bonds to both grips.
     pub dropped: usize,
 }
 
-/// A piece while the lattice is put together.
+/// A component while the lattice is put together.
 struct Component {
     /// Candidate of the frame.
     cell: u32,
@@ -116,31 +116,33 @@ struct Component {
 impl ConnectedSites {
     /// Builds the lattice of simple cubic `frame`, keeping what has a path of bonds to both grips.
     pub fn connect(frame: Frame, bone: &Volume<u8>, grips: Grips) -> Self {
-        let (pieces, touching) = touching::find(&frame, bone);
+        let (components, touching) = touching::find(&frame, bone);
         let mut bonds = Bonding {
             frame: &frame,
-            pieces: &pieces,
+            components: &components,
             touching: &touching,
         }
         .all();
         drop(touching);
         let axis = frame.axis.index();
-        let plane = |p: usize| frame.indices(pieces[p].cell as usize)[axis];
+        let plane = |p: usize| frame.indices(components[p].cell as usize)[axis];
         let low = bonds.reached(|p| plane(p) <= grips.low);
         let high = bonds.reached(|p| plane(p) >= grips.high);
-        let kept: Vec<usize> = (0..pieces.len()).filter(|&p| low[p] && high[p]).collect();
-        if kept.len() < pieces.len() {
+        let kept: Vec<usize> = (0..components.len())
+            .filter(|&p| low[p] && high[p])
+            .collect();
+        if kept.len() < components.len() {
             bonds.keep(&kept);
         }
         ConnectedSites {
             indices: kept
                 .iter()
-                .map(|&p| frame.indices(pieces[p].cell as usize))
+                .map(|&p| frame.indices(components[p].cell as usize))
                 .collect(),
-            fractions: kept.iter().map(|&p| pieces[p].fraction).collect(),
+            fractions: kept.iter().map(|&p| components[p].fraction).collect(),
             bonds,
             grips,
-            dropped: pieces.len() - kept.len(),
+            dropped: components.len() - kept.len(),
             frame,
         }
     }
@@ -186,7 +188,7 @@ mod tests {
             &grid,
             Structure::Sc,
             lp,
-            Boundary::Graded,
+            Boundary::Connected,
             Axis::Z,
             [0.0; 3],
         )

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 const REACH: f64 = 1.1;
 
 /// 1 where a site exists, for every candidate.
-pub fn weigh(frame: &Frame, bone: &Volume<u8>) -> Vec<f32> {
+pub fn site_weights(frame: &Frame, bone: &Volume<u8>) -> Vec<f32> {
     let bits = Bits::of(bone);
     let radius = REACH * frame.structure.first_neighbour() * frame.lp_mm;
     let mut weights = vec![0.0; frame.candidates()];
@@ -160,7 +160,7 @@ mod tests {
                 .filter(|&i| bone.as_slice()[i] != 0)
                 .map(centre)
                 .collect();
-            let weights = weigh(&frame, &bone);
+            let weights = site_weights(&frame, &bone);
             let mut exist = 0;
             for (c, &weight) in weights.iter().enumerate() {
                 let at = frame.indices(c);

@@ -86,7 +86,7 @@ fn by_loops<H: Shape, S: Precision>(
             neighbours: &sites.neighbours,
         };
         let weights = scaled.weights.as_deref();
-        // SAFETY: AVX2 is asked for where `fast` is told.
+        // SAFETY: `fast` is true only where there is AVX2.
         unsafe {
             match fast {
                 #[cfg(target_arch = "x86_64")]
@@ -111,7 +111,7 @@ fn by_loops<H: Shape, S: Precision>(
         let theta = &mut t[range.clone()];
         let all = theta.as_flattened().iter().zip(sums.as_flattened());
         assert!(all.into_iter().all(|(a, b)| near(*a, *b)));
-        scaled.weigh(range, theta);
+        scaled.scale_by_weights(range, theta);
     }
     for range in [0..n / 3, n / 3..n] {
         let y = &mut y[range.clone()];
@@ -128,7 +128,7 @@ fn loops_pull_as_bonds_do() {
             let sites = sites(structure, dense, weighted);
             assert!(sites.len() > 64 && sites.weights.is_some() == weighted);
             let moduli = Moduli::new(structure, 0.1, 100.0, 0.3).unwrap();
-            let model = Lattice::new(&sites, moduli);
+            let model = Lattice::new(sites.clone(), moduli);
             let u = numbers(sites.len(), |v| v);
             let single = numbers(sites.len(), |v| v as f32);
             let exact = bond_by_bond(&model, &u);

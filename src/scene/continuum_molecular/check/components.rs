@@ -29,12 +29,16 @@ pub fn check(scene: &Setting, model: &Molecular, turns: bool) -> Result<()> {
 }
 
 fn there(model: &Molecular, turns: bool) -> Vec<&'static str> {
-    let elastic = match (&model.elasticity, turns) {
+    let elastic = match (model.problem.elasticity(), turns) {
         (None, _) => &[],
         (Some(_), false) => &ELASTIC[..2],
         (Some(_), true) => &ELASTIC[..],
     };
-    let conducted = model.conduction.iter().flat_map(|_| CONDUCTED);
+    let conducted = model
+        .problem
+        .conduction()
+        .into_iter()
+        .flat_map(|_| CONDUCTED);
     elastic.iter().copied().chain(conducted).collect()
 }
 
@@ -45,7 +49,7 @@ fn wrong(component: &str, model: &Molecular, turns: bool) -> Option<&'static str
         Some("but the scene has no conduction")
     } else if !ELASTIC.contains(&component) {
         Some("which is no component")
-    } else if model.elasticity.is_none() {
+    } else if model.problem.elasticity().is_none() {
         Some("but the scene has no elasticity")
     } else {
         Some("but its points do not turn: bonds of this material neither shear nor bend")

@@ -1,7 +1,7 @@
 //! Owns the refusal of numbers that are none, and of signs and exponents that cannot be.
 
 use crate::error::{Error, Result};
-use crate::scene::continuum_molecular::{KnownField, Molecular};
+use crate::scene::continuum_molecular::{KnownField, Molecular, Problem};
 use crate::scene::setting::Setting;
 use serde::Serialize;
 use toml::Value;
@@ -20,11 +20,12 @@ pub fn check(scene: &Setting, model: &Molecular) -> Result<()> {
             return Err(Error::setting(key, found, "give a positive number"));
         }
     }
-    if model.vibration.is_some_and(|v| v.modes == 0) {
+    if matches!(&model.problem, Problem::Vibration { vibration, .. } if vibration.modes == 0) {
         let advice = "give at least one mode";
         return Err(Error::setting("vibration.modes", "found 0", advice));
     }
-    model.known.iter().try_for_each(|k| exponents(&k.field))
+    let mut known = model.known.iter().enumerate();
+    known.try_for_each(|(k, known)| exponents(k, &known.field))
 }
 
 fn table(settings: &impl Serialize) -> Result<Value> {
@@ -57,20 +58,23 @@ fn finite(value: &Value, key: &str, region: bool) -> Result<()> {
 
 fn positive(model: &Molecular) -> Vec<(&'static str, f64)> {
     let mut numbers = vec![("thickness", model.thickness)];
-    if let Some(bending) = model.elasticity.as_ref().and_then(|e| e.bending) {
+    if let Some(bending) = model.problem.elasticity().and_then(|e| e.bending) {
         numbers.push(("elasticity.bending.first", bending.first));
         numbers.push(("elasticity.bending.second", bending.second));
     }
-    if let Some(capacity) = model.conduction.as_ref().and_then(|c| c.capacity) {
-        numbers.push(("conduction.capacity", capacity));
+    match &model.problem {
+        Problem::Transient(transient) => numbers.push(("conduction.capacity", transient.capacity)),
+        Problem::Vibration { vibration, .. } => {
+            numbers.push(("vibration.density", vibration.density));
+        }
+        _ => {}
     }
-    numbers.extend(model.vibration.map(|v| ("vibration.density", v.density)));
     numbers
 }
 
 /// # Errors
 /// Exponents other than whole numbers from 0 on: left of an axis the field would be no number.
-fn exponents(field: &KnownField) -> Result<()> {
+fn exponents(k: usize, field: &KnownField) -> Result<()> {
     let KnownField::Polynomial(terms) = field else {
         return Ok(());
     };
@@ -78,7 +82,7 @@ fn exponents(field: &KnownField) -> Result<()> {
     match exponents.find(|e| e.fract() != 0.0 || **e < 0.0) {
         None => Ok(()),
         Some(wrong) => Err(Error::setting(
-            "known.field.polynomial",
+            format!("known[{k}].field.polynomial"),
             format!("found an exponent of {wrong}"),
             "give rows [a, b, c] of c x^a y^b with whole a and b from 0 on",
         )),

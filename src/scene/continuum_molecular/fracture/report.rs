@@ -1,13 +1,14 @@
 //! Owns what fracture reports: damage, loads, energies and their balance, the crack's measures.
 
-use super::{Front, Ledger};
+use super::{CrackGrowth, Ledger};
 use crate::error::Result;
 use crate::physics::continuum_molecular::body::Body;
+use crate::scene::continuum_molecular::Problem;
 use crate::scene::continuum_molecular::conduction::{drop, potential};
 use crate::scene::continuum_molecular::steady::{displacement, scalar, summary};
 use crate::scene::frame::{Frame, Observer, Summary};
 
-impl<const D: usize> Front<'_, D> {
+impl<const D: usize> CrackGrowth<'_, D> {
     /// d = 1 - Σ over intact bonds/Σ over all (eq. 105).
     pub fn damage(&self) -> Vec<f64> {
         let at = |p: usize| {
@@ -22,8 +23,8 @@ impl<const D: usize> Front<'_, D> {
         (0..self.setup.points.len()).map(at).collect()
     }
 
-    pub fn sound_points(&self) -> usize {
-        self.sound.iter().filter(|s| **s).count()
+    pub fn unbreakable_points(&self) -> usize {
+        self.unbreakable.iter().filter(|s| **s).count()
     }
 
     pub fn numbers(&mut self) -> Vec<(String, f64)> {
@@ -64,8 +65,14 @@ impl<const D: usize> Front<'_, D> {
         let mut numbers = self.numbers();
         let mut fields = Vec::new();
         let due = accepted && (last || self.scene.output.due(self.recorded, self.lambda));
-        let conducting = self.conductor.as_ref().zip(self.model.conduction.as_ref());
-        if let Some((conductor, conduction)) = conducting.filter(|_| accepted) {
+        let probes = match &self.model.problem {
+            Problem::Fracture {
+                conduction: Some(steady),
+                ..
+            } => steady.probes,
+            _ => None,
+        };
+        if let Some(conductor) = self.conductor.as_ref().filter(|_| accepted) {
             let (values, unknowns) = potential(
                 self.scene,
                 self.model,
@@ -75,7 +82,7 @@ impl<const D: usize> Front<'_, D> {
                 self.lambda,
             )?;
             self.potential_unknowns = unknowns;
-            if let Some(probes) = conduction.probes {
+            if let Some(probes) = probes {
                 let before = self.potential_drop;
                 self.potential_drop = drop(self.setup, probes, &values);
                 if self.potential_drop.is_nan() && !before.is_nan() {
@@ -89,12 +96,11 @@ impl<const D: usize> Front<'_, D> {
                 fields.push(scalar("potential", values));
             }
         }
-        let probed = self.model.conduction.as_ref().and_then(|c| c.probes);
-        if probed.is_some() {
+        if probes.is_some() {
             numbers.push(("potential_drop".into(), self.potential_drop));
         }
         if due {
-            self.look();
+            self.update_whole_body();
             fields.insert(0, scalar("damage", self.damage()));
             fields.push(displacement(&self.x, self.lambda));
         }
@@ -128,7 +134,7 @@ impl<const D: usize> Front<'_, D> {
             ),
             ("work", self.model.thickness * self.ledger.work),
             ("worst_balance_error", self.worst_balance),
-            ("sound_points", self.sound_points() as f64),
+            ("sound_points", self.unbreakable_points() as f64),
             ("solves", self.solves as f64),
             ("solve_iterations", self.iterations as f64),
             ("windows", self.windows as f64),

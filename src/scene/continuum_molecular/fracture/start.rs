@@ -1,6 +1,6 @@
 //! Owns what fracture starts from: the load at one, and the body before anything is broken.
 
-use super::{Front, Ledger};
+use super::{CrackGrowth, Ledger};
 use crate::error::{Error, Result};
 use crate::physics::continuum_molecular::toughness::critical_energy;
 use crate::scene::conditions::{Schedule, Time};
@@ -36,7 +36,7 @@ pub fn check<const D: usize>(
     unit_load(scene, setup, solid, time.end)?;
     critical(model, params, setup)?;
     stop(params, setup)?;
-    sound(params, setup, &solid.held).map(|_| ())
+    unbreakable(params, setup, &solid.held).map(|_| ())
 }
 
 /// # Errors
@@ -112,7 +112,7 @@ fn unlike_a_ramp(schedule: &Schedule, end: f64) -> Option<String> {
 
 /// Critical energy of each bond of the stencil.
 fn critical(model: &Molecular, params: &Fracture, setup: &Setup) -> Result<Vec<f64>> {
-    let angle_deg = model.elasticity.as_ref().map_or(0.0, |e| e.angle_deg);
+    let angle_deg = model.problem.elasticity().map_or(0.0, |e| e.angle_deg);
     let law = critical_energy(
         params.energy[0],
         params.energy[1],
@@ -129,24 +129,25 @@ fn critical(model: &Molecular, params: &Fracture, setup: &Setup) -> Result<Vec<f
 ///
 /// # Errors
 /// If that is all of them.
-fn sound(params: &Fracture, setup: &Setup, held: &[Option<f64>]) -> Result<Vec<bool>> {
+fn unbreakable(params: &Fracture, setup: &Setup, held: &[Option<f64>]) -> Result<Vec<bool>> {
     let n = setup.points.len();
     let values = held.len() / n;
-    let mut sound: Vec<bool> = (0..n)
+    let mut points: Vec<bool> = (0..n)
         .map(|p| (0..values).any(|d| held[p * values + d].is_some()))
         .collect();
-    for region in &params.unbreakable {
-        let chosen = region.select(&setup.points, n, "fracture.unbreakable")?;
-        chosen.into_iter().for_each(|p| sound[p] = true);
+    for (k, region) in params.unbreakable.iter().enumerate() {
+        let key = format!("fracture.unbreakable[{k}]");
+        let chosen = region.select(&setup.points, n, &key)?;
+        chosen.into_iter().for_each(|p| points[p] = true);
     }
-    if sound.iter().all(|s| *s) {
+    if points.iter().all(|fixed| *fixed) {
         return Err(Error::setting(
             "fracture.unbreakable",
             "every point is unbreakable or held in some component: no bond could break",
             "leave some of the body free",
         ));
     }
-    Ok(sound)
+    Ok(points)
 }
 
 /// Points at which the crack stops.
@@ -160,7 +161,7 @@ fn stop(params: &Fracture, setup: &Setup) -> Result<Vec<bool>> {
     Ok(stop)
 }
 
-impl<'a, const D: usize> Front<'a, D> {
+impl<'a, const D: usize> CrackGrowth<'a, D> {
     /// The body at rest, and a window about the bonds that will break first.
     pub fn new(
         scene: &'a Setting,
@@ -170,14 +171,14 @@ impl<'a, const D: usize> Front<'a, D> {
         setup: &'a Setup,
     ) -> Result<Self> {
         let critical = critical(model, params, setup)?;
-        let sound = sound(params, setup, &solid.held)?;
+        let unbreakable = unbreakable(params, setup, &solid.held)?;
         let stop = stop(params, setup)?;
-        let conductor = match &model.conduction {
+        let conductor = match model.problem.conduction() {
             Some(conduction) => Some(setup.conductor(model, conduction)?.0),
             None => None,
         };
         let (window, x) = Window::new(&solid.body, setup, &solid.held, &[])?;
-        let mut front = Front {
+        let mut growth = CrackGrowth {
             critical,
             broken: vec![false; setup.family.len()],
             order: Vec::new(),
@@ -187,13 +188,13 @@ impl<'a, const D: usize> Front<'a, D> {
             params,
             setup,
             solid,
-            sound,
+            unbreakable,
             crack: Crack::new(params.tip, stop),
             conductor,
             window,
             bonds: Vec::new(),
             x,
-            far: 0.0,
+            max_ratio_outside: 0.0,
             stale: false,
             step: 1,
             events: 0,
@@ -209,7 +210,7 @@ impl<'a, const D: usize> Front<'a, D> {
             potential_drop: 0.0,
             potential_unknowns: 0,
         };
-        front.move_window()?;
-        Ok(front)
+        growth.move_window()?;
+        Ok(growth)
     }
 }

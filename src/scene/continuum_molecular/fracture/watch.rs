@@ -1,6 +1,6 @@
 //! Owns where bonds are close to breaking: energy ratios everywhere, and the window that follows the largest.
 
-use super::Front;
+use super::CrackGrowth;
 use crate::error::Result;
 use crate::scene::continuum_molecular::window::Window;
 use rayon::prelude::*;
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 /// Dense points of a window about each seed reach this many spacings, or one farther than bonds do.
 const REACH: i32 = 13;
 
-impl<const D: usize> Front<'_, D> {
+impl<const D: usize> CrackGrowth<'_, D> {
     /// Energy over critical energy of a bond under unit load; 0 where it cannot break.
     pub fn ratio(&self, kind: usize, here: &[f64; D], there: &[f64; D]) -> f64 {
         let b = &self.setup.bonds[kind];
@@ -23,13 +23,13 @@ impl<const D: usize> Front<'_, D> {
     pub fn ratios(&self, p: usize) -> impl Iterator<Item = (usize, f64)> {
         self.setup.family.range(p).filter_map(move |slot| {
             let (q, kind) = self.setup.family.kind(slot);
-            let may = q > p && !self.broken[slot] && !self.sound[p] && !self.sound[q];
+            let may = q > p && !self.broken[slot] && !self.unbreakable[p] && !self.unbreakable[q];
             may.then(|| (q, self.ratio(kind, &self.x[p], &self.x[q])))
         })
     }
 
     /// Renews the whole solution and what is known of the bonds outside the window.
-    pub fn look(&mut self) {
+    pub fn update_whole_body(&mut self) {
         self.x = self.window.whole(&self.solid.body.blocks, &self.solid.held);
         self.stale = false;
         let outside = |p: usize| {
@@ -38,7 +38,7 @@ impl<const D: usize> Front<'_, D> {
                 .filter(|(q, _)| !self.window.holds(p) || !self.window.holds(*q))
                 .fold(0.0_f64, |m, (_, r)| m.max(r))
         };
-        self.far = (0..self.setup.points.len())
+        self.max_ratio_outside = (0..self.setup.points.len())
             .into_par_iter()
             .map(outside)
             .reduce(|| 0.0, f64::max);
@@ -58,7 +58,7 @@ impl<const D: usize> Front<'_, D> {
         seeds.sort_by(|&a, &b| worst[b].total_cmp(&worst[a]).then(a.cmp(&b)));
         self.put_window(&self.around(&seeds))?;
         self.windows += 1;
-        self.look();
+        self.update_whole_body();
         Ok(())
     }
 
@@ -69,7 +69,7 @@ impl<const D: usize> Front<'_, D> {
         self.window = window;
         self.x = x;
         let may = |slot: usize, p: usize, q: usize| {
-            !self.broken[slot] && !self.sound[p] && !self.sound[q]
+            !self.broken[slot] && !self.unbreakable[p] && !self.unbreakable[q]
         };
         let mut bonds = self.window.bonds(self.setup, |slot| !self.broken[slot]);
         bonds.retain(|b| may(b.slots[0], self.window.point(b.a), self.window.point(b.b)));

@@ -1,0 +1,5 @@
+//! What programs write into the description of an image file: text that tells sizes and meaning of voxels.
+
+pub mod imagej;
+pub mod length;
+pub mod ome;

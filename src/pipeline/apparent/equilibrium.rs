@@ -1,0 +1,51 @@
+//! Owns equilibrium: the one way in which every system of equations is solved.
+
+use crate::operator::coarsen::Coarsen;
+use crate::operator::{Functional, MixedPrecision};
+use crate::pipeline::apparent::discretisation::{Displacements, System};
+use crate::pipeline::apparent::params::{Conditions, Load, SolveParams};
+use crate::solver::amg::Amg;
+use crate::solver::cg::fallback::minimise_or_fall_back;
+use crate::solver::cg::{CgInfo, CgParams, CgStep};
+
+/// Is called with the number of a load and how far its solve is.
+pub type Observe<'a> = dyn FnMut(usize, CgStep) + 'a;
+
+/// Displacements in equilibrium under each of the `loads`, which share supports and so one preconditioner: conjugate
+/// gradients with multigrid, or with the diagonal where multigrid breaks down. Each load is solved when its item is taken.
+pub fn equilibrium<'a, O: MixedPrecision, C: Coarsen, G: Functional<3>>(
+    system: &'a System<'_, O, C, G>,
+    loads: &'a [usize],
+    params: &SolveParams,
+    observe: &'a mut Observe,
+) -> impl Iterator<Item = (usize, Displacements, CgInfo)> {
+    let cg = accuracy(params);
+    let multigrid = Amg::new(&system.coarsen, &system.held, &system.multigrid);
+    loads.iter().map(move |&load| {
+        let mut u = (system.start)(load);
+        let info = minimise_or_fall_back(
+            system.operator,
+            &system.held,
+            &multigrid,
+            &mut u,
+            &cg,
+            system.goal.as_ref(),
+            |step| observe(load, step),
+        );
+        (load, u, info)
+    })
+}
+
+/// When conjugate gradients may stop. Under mixed conditions stresses are wanted, which are off to first order where the
+/// energy is off to second.
+fn accuracy(params: &SolveParams) -> CgParams {
+    let stresses = params.load == Load::Stiffness && params.conditions == Conditions::Mixed;
+    CgParams {
+        energy_tolerance: match stresses {
+            true => params.tolerance.powi(2),
+            false => params.tolerance,
+        },
+        max_iterations: params.max_iterations,
+        ..CgParams::default()
+    }
+}

@@ -1,0 +1,147 @@
+//! Owns lattices with one site per cell as discretisations: firm, floppy, weighted by bone fraction.
+
+use crate::error::Result;
+use crate::measure::apparent::Loaded;
+use crate::operator::coarsen::Coarsen;
+use crate::operator::{Functional, MixedPrecision};
+use crate::physics::lattice::Lattice;
+use crate::physics::lattice::multigrid::Springs;
+use crate::pipeline::apparent::discretisation::{
+    Cost, Discretisation, Known, LoadSet, Places, Prepared, System,
+};
+use crate::pipeline::apparent::fields::{Recorded, SiteFields};
+use crate::pipeline::apparent::lattice::mixed_tissue::Blend;
+use crate::pipeline::apparent::lattice::stress::Stress;
+use crate::pipeline::apparent::lattice::{Placed, cost, label, refuse_unit_strains};
+use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::solved::Moduli;
+use crate::pipeline::lattice::{Boundary, Case, build_of, site_values};
+use crate::result::settings::Settings;
+use crate::solver::cg::CgInfo;
+use crate::volume::Specimen;
+use rayon::prelude::*;
+
+/// A lattice between its grips.
+pub struct SiteModel {
+    lattice: Lattice,
+    /// Firm: the fully coordinated sites, whose stress is the headline.
+    whole: Option<Vec<bool>>,
+    /// How many bonds away a displacement is felt.
+    bonds: i32,
+    loaded: Loaded,
+    params: SolveParams,
+}
+
+impl SiteModel {
+    fn placed(&self) -> Placed<'_> {
+        let sites = &self.lattice.sites;
+        Placed {
+            frame: &sites.frame,
+            indices: &sites.indices,
+            grips: sites.grips,
+            dropped: sites.dropped,
+        }
+    }
+
+    fn stress(&self) -> Stress<'_, Lattice> {
+        Stress {
+            model: &self.lattice,
+            counts: self.whole.as_deref(),
+        }
+    }
+}
+
+impl Discretisation for SiteModel {
+    type Case = Case;
+
+    fn label(case: &Case, _: &Specimen, _: &SolveParams, key: Settings) -> Settings {
+        label(key, case)
+    }
+
+    fn cost(case: &Case, params: &SolveParams, known: Known) -> Result<Cost> {
+        cost::of(case, known, |prepared| {
+            cost::of_sites(case, prepared, params)
+        })
+    }
+
+    fn build(case: &Case, prepared: Prepared, params: &SolveParams) -> Result<Self> {
+        refuse_unit_strains(params)?;
+        let Prepared { specimen, tissue } = prepared;
+        let Blend {
+            moduli,
+            springs,
+            volumetric,
+        } = Blend::of(tissue, case)?;
+        let sites = build_of(
+            specimen,
+            springs.as_deref(),
+            case,
+            params.axis,
+            params.grip_mm,
+        )?;
+        let whole = (case.boundary == Boundary::Firm).then(|| {
+            let all = (0..sites.len()).into_par_iter();
+            all.map(|s| sites.fully_coordinated(s)).collect()
+        });
+        let lattice = match volumetric {
+            None => Lattice::new(sites, moduli),
+            Some(tissue) => {
+                let by_site = site_values(specimen, &tissue, case, &sites);
+                let volumetric = by_site.into_iter().map(|v| v * moduli.t).collect();
+                Lattice::with_volumetric(sites, moduli, volumetric)
+            }
+        };
+        let mut model = SiteModel {
+            lattice,
+            whole,
+            // Volumetric sums couple the ends of two bonds.
+            bonds: if moduli.t == 0.0 { 1 } else { 2 },
+            loaded: Loaded::default(),
+            params: params.clone(),
+        };
+        model.loaded = model.placed().loaded(specimen, params);
+        Ok(model)
+    }
+
+    fn system(
+        &self,
+        _: LoadSet,
+    ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>> {
+        let (placed, params) = (self.placed(), &self.params);
+        let places = params.mechanisms.then(|| Places {
+            at: placed.indices.to_vec(),
+            // A bond spans up to two grid steps along an axis (SC: one).
+            reach: self.bonds * placed.frame.structure.steps_per_lp() as i32,
+        });
+        // The stress is off to first order where the energy is off to second.
+        let goal = self.whole.is_some().then(|| self.stress());
+        placed.system(
+            &self.lattice,
+            Springs::new(&self.lattice),
+            goal,
+            (params, self.loaded.displacement_mm),
+            places,
+        )
+    }
+
+    fn assess(&self, u: &[[f64; 3]], info: &CgInfo) -> Moduli {
+        self.placed().assess(&self.stress(), &self.loaded, u, info)
+    }
+
+    fn fields(
+        &self,
+        _: Prepared,
+        params: &SolveParams,
+        u: &[[f64; 3]],
+        _: &Moduli,
+    ) -> Result<Recorded> {
+        let sites = &self.lattice.sites;
+        let energy = |s| self.lattice.site_energy(u, s);
+        let fraction = |s: usize| sites.weights.as_ref().map_or(1.0, |weights| weights[s]);
+        let at = (&sites.frame, &sites.indices[..]);
+        Ok(Recorded {
+            sites: SiteFields::of(&params.fields, at, u, energy, fraction),
+            ..Recorded::default()
+        })
+    }
+}

@@ -1,0 +1,185 @@
+//! Owns voxel finite elements as a discretisation: one brick per voxel, or finer or coarser ones.
+
+pub mod bricks;
+pub mod cost;
+mod record;
+pub mod supports;
+
+use crate::discretisation::voxels::Planes;
+use crate::error::Result;
+use crate::measure::apparent::Loaded;
+use crate::operator::coarsen::Coarsen;
+use crate::operator::{Functional, MixedPrecision, Operator};
+use crate::par::sum_chunks;
+use crate::pipeline::apparent::discretisation::{
+    Cost, Discretisation, Known, LoadSet, Places, Prepared, System,
+};
+use crate::pipeline::apparent::fields::Recorded;
+use crate::pipeline::apparent::resolution;
+use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::solved::Moduli;
+use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
+use crate::result::settings::{CellType, Method, Settings};
+use crate::solver::amg::AmgParams;
+use crate::solver::cg::{CgInfo, NoGoal};
+use crate::volume::Specimen;
+
+/// Voxel elements between grips, or joined to the faces where unit strains are the load.
+pub struct VoxelModel {
+    bricks: Bricks,
+    grips: Planes,
+    loaded: Loaded,
+    params: SolveParams,
+    /// The specimen at its elements' resolution, where that is another mask than the scan's.
+    resolved: Option<Specimen>,
+}
+
+impl VoxelModel {
+    /// The model of these elements of a specimen.
+    ///
+    /// # Errors
+    /// Grips that meet.
+    pub fn of(bricks: Bricks, specimen: &Specimen, params: &SolveParams) -> Result<Self> {
+        let grip_mm = match params.load {
+            Load::Stiffness => 0.0,
+            Load::Uniaxial | Load::Confined => params.grip_mm,
+        };
+        let grid = bricks.mesh().grid;
+        let grips = Planes::within(&grid, params.axis, grip_mm)?;
+        let gauge_mm = (grips.high - grips.low) as f64 * grid.spacing_mm[params.axis.index()];
+        Ok(VoxelModel {
+            bricks,
+            grips,
+            loaded: Loaded {
+                gauge_mm,
+                area_mm2: specimen.area_mm2(params.axis),
+                displacement_mm: params.strain * gauge_mm,
+            },
+            params: params.clone(),
+            resolved: None,
+        })
+    }
+}
+
+impl Discretisation for VoxelModel {
+    /// Size and tissue of the elements stand in the settings of the solve.
+    type Case = ();
+
+    /// The size of the elements: the mean edge where edges differ.
+    fn label(_: &(), specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings {
+        let [x, y, z] = specimen.bone.grid.spacing_mm;
+        let edge = if x == y && y == z {
+            x
+        } else {
+            (x * y * z).cbrt()
+        };
+        Settings {
+            method: Method::VoxelFe,
+            structure: CellType::Hex8,
+            boundary: None,
+            lp_mm: edge * params.coarsen as f64 / params.refine as f64,
+            elements: Some(resolution::elements(specimen, params)),
+            registration_mm: None,
+            ..key
+        }
+    }
+
+    fn cost(_: &(), params: &SolveParams, known: Known) -> Result<Cost> {
+        Ok(cost::of(params, known))
+    }
+
+    fn build(_: &(), prepared: Prepared, params: &SolveParams) -> Result<Self> {
+        let keep = Keep::under(params.load);
+        let Some(resolved) = resolution::resolved(prepared.specimen, params)? else {
+            let bricks = Bricks::new(prepared, params, keep)?;
+            return VoxelModel::of(bricks, prepared.specimen, params);
+        };
+        let own = resolution::one_element_a_voxel(params);
+        let specimen = &resolved;
+        let bricks = Bricks::new(Prepared { specimen, ..prepared }, &own, keep)?;
+        let model = VoxelModel::of(bricks, specimen, &own)?;
+        Ok(VoxelModel {
+            resolved: Some(resolved),
+            ..model
+        })
+    }
+
+    fn system(
+        &self,
+        loads: LoadSet,
+    ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>> {
+        let (mesh, grips, params) = (self.bricks.mesh(), self.grips, &self.params);
+        System {
+            operator: &self.bricks,
+            coarsen: &self.bricks,
+            multigrid: AmgParams::new(mesh.grid.spacing_mm),
+            goal: None::<NoGoal>,
+            held: match loads {
+                LoadSet::Compression => supports::held(mesh, grips, params),
+                LoadSet::UnitStrains(numbers) => {
+                    supports::held_faces(mesh, params.conditions, numbers[0])
+                }
+            },
+            start: Box::new(move |load| match loads {
+                LoadSet::Compression => supports::bar(mesh, grips, self.loaded.displacement_mm),
+                LoadSet::UnitStrains(_) => supports::affine(mesh, load),
+            }),
+            sites: mesh.elements,
+            dropped: mesh.dropped,
+            places: params.mechanisms.then(|| Places {
+                at: supports::grid_places(mesh),
+                reach: 1,
+            }),
+        }
+    }
+
+    fn assess(&self, u: &[[f64; 3]], info: &CgInfo) -> Moduli {
+        let (mesh, grips, loaded) = (self.bricks.mesh(), self.grips, &self.loaded);
+        let axis = grips.axis.index();
+        let mut force = vec![[0.0; 3]; mesh.len()];
+        self.bricks.apply(u, &mut force);
+        // Σ x_i f_i is the volume integral of the stress, exactly, since positions are a displacement field of the
+        // elements; clamped to the gauge, it is the integral between the innermost gripped planes.
+        let sum = |weight: &(dyn Fn(usize) -> f64 + Sync)| {
+            sum_chunks(mesh.segments.len(), |range| {
+                let part = |s: usize| {
+                    let segment = &mesh.segments[s];
+                    let nodes = segment.nodes().enumerate();
+                    nodes
+                        .map(|(i, node)| {
+                            let x = if axis == 0 { i } else { 0 };
+                            weight(segment.at[axis] as usize + x) * force[node][axis]
+                        })
+                        .sum::<f64>()
+                };
+                range.map(part).sum()
+            })
+        };
+        let reaction = sum(&|plane| if plane >= grips.high { 1.0 } else { 0.0 });
+        let virial = loaded.gauge_mm * sum(&|plane| supports::along(grips, plane));
+        let from_energy_mpa = loaded.from_energy(info.energy);
+        Moduli {
+            e_app_mpa: from_energy_mpa,
+            from_energy_mpa,
+            from_reaction_mpa: loaded.from_reaction(reaction),
+            from_stress_mpa: loaded.from_virial(virial),
+            algebraic_error_mpa: info.energy_error / info.energy * from_energy_mpa,
+        }
+    }
+
+    fn fields(
+        &self,
+        prepared: Prepared,
+        params: &SolveParams,
+        u: &[[f64; 3]],
+        moduli: &Moduli,
+    ) -> Result<Recorded> {
+        let reaction_n = moduli.from_reaction_mpa * self.loaded.area_mm2 * params.strain;
+        let Some(specimen) = &self.resolved else {
+            return record::record(&self.bricks, prepared, params, u, reaction_n);
+        };
+        let own = Prepared { specimen, ..prepared };
+        let recorded = record::record(&self.bricks, own, &self.params, u, reaction_n)?;
+        Ok(record::onto(recorded, &prepared.specimen.bone))
+    }
+}

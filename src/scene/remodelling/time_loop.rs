@@ -1,0 +1,247 @@
+//! Owns the loop over time steps: steps that halve when they do not converge, and grow back afterwards.
+
+use crate::error::Result;
+use crate::scene::conditions::Time;
+use crate::scene::frame::{Frame, Observer, Output, Summary};
+use crate::scene::remodelling::step_size::StepSize;
+use crate::scene::state::State;
+use crate::scene::step_statistics::StepStatistics;
+use crate::solver::newton::NotConverged;
+
+/// A model that can be taken from one time to a later one.
+pub trait Marching {
+    /// Solves one step. On failure the state stays as it was.
+    fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged>;
+    /// Times at which supports or loads jump or bend.
+    fn corners(&self) -> Vec<f64>;
+    /// Relative densities, as far as they change.
+    fn densities(&self) -> Vec<f64>;
+    /// The current state at time `t`.
+    fn frame(&self, t: f64, with_fields: bool) -> Frame;
+    /// Everything that later steps depend on.
+    fn save(&self, state: &mut State);
+    /// Goes back to a saved state: what follows is what would have followed it.
+    fn restore(&mut self, state: &State) -> Result<()>;
+}
+
+/// What one accepted step took.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Advance {
+    pub iterations: usize,
+    pub factorisations: usize,
+    /// Largest dimensionless residual left.
+    pub error: f64,
+}
+
+/// Successful steps after which a halved step is doubled.
+const GROW_AFTER: u32 = 4;
+
+/// Time in ticks of the smallest step, so that halved steps still end on the planned ones.
+struct Clock {
+    step: f64,
+    /// Planned steps, and ticks of each.
+    steps: u64,
+    whole: u64,
+    /// Halvings down to one tick.
+    finest: u32,
+}
+
+impl Clock {
+    fn new(time: &Time) -> Result<Self> {
+        let steps = time.steps()?;
+        let finest = (1.0 / time.smallest_share).log2().ceil().clamp(0.0, 40.0) as u32;
+        Ok(Clock {
+            step: time.step,
+            steps,
+            whole: 1 << finest,
+            finest,
+        })
+    }
+
+    /// Without what rounding adds: three steps of 0.1 end at 0.3.
+    fn at(&self, ticks: u64) -> f64 {
+        let (planned, rest) = (ticks / self.whole, ticks % self.whole);
+        rounded(planned as f64 * self.step + self.step * rest as f64 / self.whole as f64)
+    }
+
+    /// Length of so many ticks: the same wherever they begin.
+    fn span(&self, ticks: u64) -> f64 {
+        self.step * (ticks as f64 / self.whole as f64)
+    }
+
+    fn length(&self, level: u32) -> f64 {
+        self.step / (1u64 << level) as f64
+    }
+}
+
+/// To twelve digits: more than any step needs, less than rounding spoils.
+pub fn rounded(t: f64) -> f64 {
+    format!("{t:.11e}").parse().unwrap_or(t)
+}
+
+/// How far a run has come, and what it took.
+#[derive(Default)]
+struct Progress {
+    ticks: u64,
+    /// Halvings in force, and steps accepted since the last change.
+    level: u32,
+    streak: u32,
+    steps: usize,
+    iterations: usize,
+    factorisations: usize,
+    worst: f64,
+    step_statistics: StepStatistics,
+}
+
+impl Progress {
+    fn accepted(&mut self, clock: &Clock, length: u64, advance: &Advance) {
+        self.ticks += length;
+        self.step_statistics.accepted(clock.span(length));
+        self.streak += 1;
+        self.steps += 1;
+        self.iterations += advance.iterations;
+        self.factorisations += advance.factorisations;
+        self.worst = self.worst.max(advance.error);
+    }
+
+    fn save(&self, clock: &Clock, state: &mut State) {
+        let counts = [
+            (self.ticks / clock.whole) as f64,
+            (self.ticks % clock.whole) as f64,
+            f64::from(self.level),
+            f64::from(self.streak),
+            self.steps as f64,
+            self.iterations as f64,
+            self.factorisations as f64,
+            self.worst,
+        ];
+        state.put("march", counts);
+        self.step_statistics.save(state);
+    }
+
+    fn restore(&mut self, clock: &Clock, state: &State) -> Result<()> {
+        let counts = state.array("march", 8)?;
+        *self = Progress {
+            ticks: counts[0] as u64 * clock.whole + counts[1] as u64,
+            level: counts[2] as u32,
+            streak: counts[3] as u32,
+            steps: counts[4] as usize,
+            iterations: counts[5] as usize,
+            factorisations: counts[6] as usize,
+            worst: counts[7],
+            step_statistics: StepStatistics::restore(state)?,
+        };
+        Ok(())
+    }
+
+    fn report(&self, summary: &mut Summary) {
+        summary.steps = self.steps;
+        summary.converged = summary.stopped.is_none();
+        summary.step_statistics = Some(self.step_statistics.clone());
+        let total = |name: &str, value: f64| (name.to_owned(), value);
+        summary.numbers.extend([
+            total("iterations", self.iterations as f64),
+            total("factorisations", self.factorisations as f64),
+            total("largest_residual", self.worst),
+        ]);
+    }
+}
+
+/// # Errors
+/// Times that no run can take.
+pub fn check(time: &Time) -> Result<()> {
+    Clock::new(time).map(|_| ())
+}
+
+/// Marches to `time.end`, from rest or from the state the observer kept. A step that fails at its smallest stops the
+/// run: the last good state is reported with its fields and the summary says why.
+pub fn run_time_loop(
+    model: &mut impl Marching,
+    time: &Time,
+    output: &Output,
+    observer: &mut dyn Observer,
+    summary: &mut Summary,
+) -> Result<()> {
+    let clock = Clock::new(time)?;
+    let mut step_size = StepSize::new(time, model.corners());
+    let mut progress = Progress::default();
+    match observer.resume()? {
+        Some(state) => {
+            progress.restore(&clock, &state)?;
+            step_size.restore(&state)?;
+            model.restore(&state)?;
+            observer.say(&format!("resumed at t = {:.6}", clock.at(progress.ticks)));
+        }
+        None => observer.frame(&model.frame(0.0, true))?,
+    }
+    let mut densities = model.densities();
+    let end = clock.steps * clock.whole;
+    while progress.ticks < end {
+        let ticks = progress.ticks;
+        let length = match progress.level {
+            0 if ticks % clock.whole == 0 => {
+                step_size.next(ticks / clock.whole, clock.steps, output) * clock.whole
+            }
+            level => clock.whole >> level,
+        };
+        let (before, now) = (clock.at(ticks), clock.at(ticks + length));
+        match model.advance(before, now) {
+            Ok(advance) => {
+                progress.accepted(&clock, length, &advance);
+                if step_size.is_adaptive() {
+                    let old = std::mem::replace(&mut densities, model.densities());
+                    step_size.accepted(now, now - before, &old, &densities);
+                }
+                let due = progress.ticks == end || output.due(before, now);
+                observer.frame(&model.frame(now, due))?;
+                grow(&mut progress, &clock, observer);
+                observer.keep(&|| {
+                    let mut state = State::default();
+                    progress.save(&clock, &mut state);
+                    step_size.save(&mut state);
+                    model.save(&mut state);
+                    state
+                })?;
+            }
+            Err(why) if length > clock.whole => {
+                step_size.failed();
+                progress.step_statistics.halved();
+                observer.say(&format!("t = {now:.6}: {why}; a shorter step is tried"));
+            }
+            Err(why) if progress.level < clock.finest => {
+                progress.level += 1;
+                progress.streak = 0;
+                progress.step_statistics.halved();
+                let length = clock.length(progress.level);
+                observer.say(&format!("t = {now:.6}: {why}; step halved to {length:.3e}"));
+            }
+            Err(why) => {
+                observer.again(&model.frame(before, true))?;
+                summary.stopped = Some(format!(
+                    "at t = {before:.6} no step down to {:.3e} converged: {why}; the last good state is written",
+                    now - before
+                ));
+                break;
+            }
+        }
+    }
+    progress.report(summary);
+    Ok(())
+}
+
+/// Doubles a halved step that has done well, where the longer one ends on the planned steps.
+fn grow(progress: &mut Progress, clock: &Clock, observer: &mut dyn Observer) {
+    let Progress { level, streak, .. } = *progress;
+    if level > 0
+        && streak >= GROW_AFTER
+        && progress.ticks.is_multiple_of(clock.whole >> (level - 1))
+    {
+        progress.level -= 1;
+        progress.streak = 0;
+        observer.say(&format!(
+            "t = {:.6}: step grown to {:.3e}",
+            clock.at(progress.ticks),
+            clock.length(progress.level)
+        ));
+    }
+}

@@ -188,10 +188,10 @@ fn the_unit_is_the_one_that_the_series_names() {
     ] {
         assert_eq!(stored(&files).unwrap().unit.as_deref(), unit);
         let hu = with(&files, |p| {
-            scan::read_in(p, None, Some(GreyUnit::Hu)).is_ok()
+            scan::read_as(p, &scan::Reading { unit: Some(GreyUnit::Hu), ..scan::Reading::default() }).is_ok()
         });
         let mgha = with(&files, |p| {
-            scan::read_in(p, None, Some(GreyUnit::Mgha)).is_ok()
+            scan::read_as(p, &scan::Reading { unit: Some(GreyUnit::Mgha), ..scan::Reading::default() }).is_ok()
         });
         assert_eq!((hu, mgha), (unit == Some("HU"), unit == Some("mg HA/cm3")));
     }

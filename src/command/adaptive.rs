@@ -76,7 +76,9 @@ impl Climb<'_> {
         }
         let rows = self.step(&native)?;
         match self.scan.image() {
-            Image::Grey { blur_voxels } if !self.is_done(&rows) && self.params.material.is_none() => {
+            Image::Grey { blur_voxels }
+                if !self.is_done(&rows) && self.params.material.is_none() =>
+            {
                 self.refine(rows, blur_voxels)
             }
             _ => Ok(rows),

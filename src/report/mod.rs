@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn scans_of_like_names_have_figures_of_their_own() {
         let names = ["scan 1", "scan_1", "SCAN_1", "scan_1-2"];
-        let rows = names.map(|name| row(name, "floppy", 0.1, 30.0));
+        let rows = names.map(|name| row(name, BoundaryRule::FLOPPY, 0.1, 30.0));
         let report = report(&rows, &ReportParams::default());
         let mut stems: Vec<String> = report
             .figures

@@ -8,8 +8,8 @@
 //! FE falls with the power 1.3 (edges of voxels; 1.17 to 1.31 fitted on phantoms, `reports/speed-vs-error.md`), from above.
 
 use crate::result::row::{Marks, Row, Solution};
-use crate::result::shape;
 use crate::result::settings::{BoundaryRule, Elements, Load, Method, Settings};
+use crate::result::shape;
 
 /// Order in LP of a graded lattice's error.
 const LATTICE_ORDER: f64 = 2.0;

@@ -2,8 +2,8 @@
 //! and the floppy modulus. Its stated error is half their gap, which is a bracket, not a likely error.
 
 use crate::result::row::{Marks, Row, Solution};
-use crate::result::shape;
 use crate::result::settings::{BoundaryRule, Settings};
+use crate::result::shape;
 
 /// The rows of `rows` with one FFB row after each pair of firm and floppy that differ in nothing else. FFB rows already
 /// there are replaced.

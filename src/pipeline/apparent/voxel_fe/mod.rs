@@ -15,8 +15,8 @@ use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, Known, LoadSet, Places, Prepared, System,
 };
 use crate::pipeline::apparent::fields::Recorded;
-use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use crate::result::settings::{CellType, Method, Settings};
@@ -96,7 +96,14 @@ impl Discretisation for VoxelModel {
         };
         let own = resolution::one_element_a_voxel(params);
         let specimen = &resolved;
-        let bricks = Bricks::new(Prepared { specimen, ..prepared }, &own, keep)?;
+        let bricks = Bricks::new(
+            Prepared {
+                specimen,
+                ..prepared
+            },
+            &own,
+            keep,
+        )?;
         let model = VoxelModel::of(bricks, specimen, &own)?;
         Ok(VoxelModel {
             resolved: Some(resolved),
@@ -178,7 +185,10 @@ impl Discretisation for VoxelModel {
         let Some(specimen) = &self.resolved else {
             return record::record(&self.bricks, prepared, params, u, reaction_n);
         };
-        let own = Prepared { specimen, ..prepared };
+        let own = Prepared {
+            specimen,
+            ..prepared
+        };
         let recorded = record::record(&self.bricks, own, &self.params, u, reaction_n)?;
         Ok(record::onto(recorded, &prepared.specimen.bone))
     }

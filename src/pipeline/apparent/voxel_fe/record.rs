@@ -105,18 +105,18 @@ fn surface(model: &Bricks, kinds: &[Kind], u: &[[f64; 3]]) -> Option<SurfaceEner
     }))
 }
 
-    /// The same on the scan's grid, from elements of another size: the mean of a voxel's elements where they are finer, that
-    /// of the element around the voxel's centre where they are coarser.
+/// The same on the scan's grid, from elements of another size: the mean of a voxel's elements where they are finer, that
+/// of the element around the voxel's centre where they are coarser.
 pub fn onto(recorded: Recorded, scan: &Volume<u8>) -> Recorded {
-        let fields = recorded.fields.into_iter().map(|field| FieldVolume {
-            name: field.name,
-            values: volume_onto(&field.values, scan),
-        });
-        Recorded {
-            fields: fields.collect(),
-            ..recorded
-        }
+    let fields = recorded.fields.into_iter().map(|field| FieldVolume {
+        name: field.name,
+        values: volume_onto(&field.values, scan),
+    });
+    Recorded {
+        fields: fields.collect(),
+        ..recorded
     }
+}
 
 fn volume_onto(values: &Volume<f32>, scan: &Volume<u8>) -> Volume<f32> {
     let (from, to) = (values.grid, scan.grid);

@@ -465,7 +465,7 @@ def tifffile_files(dir):
     pyramid = dir / "pyramid.ome.tif"
     with tifffile.TiffWriter(pyramid, ome=True) as out:
         out.write(GREY, subifds=1, metadata={"axes": "ZYX"})
-        out.write(GREY[:, ::2, ::2], subfiletype=1)
+        out.write(GREY[:, ::2, ::2], subfiletype=1, photometric="minisblack")
     check("tifffile OME pyramid", pyramid, world, None, extra=("--spacing", "0.02"), grey=GREY)
     thumbnail = dir / "thumbnail.tif"
     with tifffile.TiffWriter(thumbnail) as out:
@@ -503,8 +503,8 @@ def tifffile_files(dir):
             tifffile.imwrite(path, small, photometric="minisblack", bitspersample=bits, rowsperstrip=GREY.shape[1])
             back = tifffile.imread(path)
             assert (back == small).all(), "tifffile reads something else"
-            lower = (1 << bits) // 2
-            check(f"tifffile {bits} bits", path, (back >= lower).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", lower), grey=back)
+            lower = int(back.max()) // 2 + 0.5
+            check(f"tifffile {bits} bits", path, (back > lower).astype(np.uint8), None, extra=("--spacing", "0.02", "--lower", lower), grey=back)
         refused("tifffile LZMA", dir / "lzma.tif", "LZMA", lambda path: tifffile.imwrite(path, GREY, photometric="minisblack", compression="lzma"))
     tifffile.imwrite(dir / "float.tif", GREY.astype(np.float32), photometric="minisblack")
     check("tifffile float32", dir / "float.tif", world, None, extra=("--spacing", "0.02"))

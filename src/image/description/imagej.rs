@@ -82,8 +82,8 @@ impl ImageJ {
         Some(self.spacing.unwrap_or(1.0) * self.unit_mm(2)?)
     }
 
-    /// What a user should know of the size of a stack's voxels.
-    pub fn size_notes(&self) -> Vec<String> {
+    /// What a user should know of a stack's axes.
+    pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             let unit = self.unit(axis);

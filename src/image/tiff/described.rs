@@ -119,9 +119,9 @@ impl Described {
                 if let Resolution::PerUnit(per_unit) = resolution {
                     size.pixel_mm = facts.pixel_mm(per_unit);
                 }
-                if slices > 1 && size.pixel_mm.is_some() {
+                if slices > 1 {
                     size.slice_mm = facts.slice_mm();
-                    size.notes = facts.size_notes();
+                    size.notes = facts.notes();
                 }
             }
             Described::Ome(ome) => {

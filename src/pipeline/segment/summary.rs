@@ -147,7 +147,10 @@ pub fn implausible_voxels(spacing_mm: [f64; 3]) -> Vec<String> {
     let [low, high] = VOXEL_MM;
     let mut found = Vec::new();
     if let Some(edge) = spacing_mm.into_iter().find(|h| !(low..=high).contains(h)) {
-        let slip = likely(edge).map_or(String::new(), |mm| format!(": {mm} mm instead of {edge}?"));
+        // A slip of the unit is one of all axes.
+        let all = spacing_mm.into_iter().all(|h| !(low..=high).contains(&h));
+        let meant = likely(edge).filter(|_| all);
+        let slip = meant.map_or(".".into(), |mm| format!(": {mm} mm instead of {edge}?"));
         found.push(format!(
             "voxels of {edge} mm are outside {low} to {high} mm{slip} Give --spacing if the file is wrong"
         ));

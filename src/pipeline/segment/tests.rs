@@ -78,7 +78,8 @@ fn crop_comes_first_and_a_given_cylinder_stays_in_scan_coordinates() {
     assert_eq!(s.summary.voxels, [6, 6, 4]);
     // Centre of voxel (4, 5): the voxel and its four neighbours in a circle of radius one voxel, in 4 slices.
     assert_eq!(s.summary.bone_voxels, 20);
-    assert!((s.summary.tv_mm3 - std::f64::consts::PI * 0.01 * 0.4).abs() < 1e-12);
+    assert!((s.summary.tv_mm3 - 20.0 * 1e-3).abs() < 1e-12);
+    assert_eq!(s.summary.bv_tv, 1.0);
     assert_eq!(s.summary.tv_definition, "cylinder d=0.2 mm");
 }
 

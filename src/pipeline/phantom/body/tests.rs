@@ -73,7 +73,7 @@ fn every_kind_has_the_volume_fraction_asked_for() {
             0.05,
         );
         let partial = partial_volumes(&made(&p), &p, 0);
-        // Counted on 120 000 points there, on 100³ here.
+        // Counted on 64³ points there, good to 0.0005, on 100³ parts here.
         let found = share(partial.as_slice());
         assert!((found - 0.25).abs() < 2e-3, "{kind:?} {found}");
     }

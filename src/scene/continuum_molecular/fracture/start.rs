@@ -132,7 +132,7 @@ fn critical(model: &Molecular, params: &Fracture, setup: &Setup) -> Result<Vec<f
 fn unbreakable(params: &Fracture, setup: &Setup, held: &[Option<f64>]) -> Result<Vec<bool>> {
     let n = setup.points.len();
     let values = held.len() / n;
-    let mut unbreakable: Vec<bool> = (0..n)
+    let mut points: Vec<bool> = (0..n)
         .map(|p| (0..values).any(|d| held[p * values + d].is_some()))
         .collect();
     for (k, region) in params.unbreakable.iter().enumerate() {

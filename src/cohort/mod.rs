@@ -386,3 +386,28 @@ fn plan(
     ));
     results
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_are_written_in_words() {
+        let all = [
+            State::Done,
+            State::NotConverged,
+            State::ErrorNotMet,
+            State::Failed,
+            State::Planned,
+        ];
+        let words = serde_json::to_value(all).unwrap();
+        let expected = [
+            "done",
+            "not converged",
+            "error not met",
+            "failed",
+            "planned",
+        ];
+        assert_eq!(words, serde_json::json!(expected));
+    }
+}

@@ -262,6 +262,63 @@ fn keys_without_effect_are_refused() {
     assert_runs(&plate("", &known(strain, STEEL)));
 }
 
+/// Tables that do not go together are refused where the file is read, with one piece of advice; so is a misspelt key.
+#[test]
+fn tables_that_do_not_go_together_are_refused() {
+    let modes = "vibration = { density = 1, modes = 2 }";
+    let fracture = "fracture = { energy = [1, 1] }";
+    for (model, found, advice) in [
+        (
+            "thickness = 1",
+            "neither elasticity nor conduction",
+            "at least one",
+        ),
+        (modes, "without elasticity", "add the table of elasticity"),
+        (
+            &format!("{STEEL}\n{HEAT}"),
+            "do not act on each other",
+            "broken bonds stop conducting",
+        ),
+        (
+            &format!("{STEEL}\n{fracture}\n{modes}"),
+            "both fracture and vibration",
+            "make two scenes",
+        ),
+        (
+            &STEEL.replace("elasticity", "elastisity"),
+            "unknown field `elastisity`",
+            "did you mean `elasticity`?",
+        ),
+    ] {
+        let error = refused(&plate(CLAMPED, model));
+        let (before, after) = error.split_once("what to do: ").unwrap();
+        assert!(
+            before.contains("test.toml") && before.contains(found),
+            "{error}"
+        );
+        assert!(after.contains(advice), "{error}");
+        assert!(!after.contains("what to do"), "{error}");
+    }
+}
+
+/// What a scene file says is what is written of it.
+#[test]
+fn a_scene_survives_writing() {
+    let heat = HEAT.replace(" }", ", capacity = 1, initial = 2 }");
+    for text in [
+        plate(CLAMPED, STEEL),
+        plate(&format!("{WARM}\n{TIME}"), &heat),
+        wired_strip(0.02),
+    ] {
+        let scene = Scene::parse(&text, Path::new("test.toml")).unwrap();
+        let written = toml::to_string(&scene).unwrap();
+        assert_eq!(
+            Scene::parse(&written, Path::new("test.toml")).unwrap(),
+            scene
+        );
+    }
+}
+
 /// What is prescribed twice is refused: [[hold]] and known have no order.
 #[test]
 fn a_point_is_not_both_held_and_known() {

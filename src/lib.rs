@@ -8,8 +8,8 @@
 //! | 0 | [`error`], [`par`], [`simd`] | messages to the person at the keyboard; vector sums that repeat on any number of threads; eight lanes chosen at run time |
 //! | 1 | [`grid`] | indices, voxels, millimetres |
 //! | 2 | [`volume`], [`io`] | values on a grid and the segmented specimen; files written whole, tables |
-//! | 3 | [`image`], [`mask`] | scan readers, one format a file; turning and resampling, smoothing, thresholds, volumes of interest, connected components |
-//! | 4 | [`discretisation`] | who touches whom, without any moduli: lattices, voxel meshes, points of a plane |
+//! | 3 | [`format`](mod@crate::format), [`mask`] | what file formats share: raw voxels, lengths, orientation, calibration; turning and resampling, smoothing, thresholds, volumes of interest, connected components |
+//! | 4 | [`image`], [`discretisation`] | scan readers, one format a file; who touches whom, without any moduli: lattices, voxel meshes, points of a plane |
 //! | 5 | [`operator`] | the seam: what a solver may know of a model |
 //! | 6 | [`physics`] and [`solver`] | energies and forces; algorithms. Neither imports the other |
 //! | 7 | [`measure`] and [`result`] | numbers of a mask or a field; what rows of results say together |
@@ -25,6 +25,7 @@ pub mod discretisation;
 pub mod draw;
 pub mod error;
 pub mod export;
+pub mod format;
 pub mod grid;
 pub mod image;
 pub mod io;

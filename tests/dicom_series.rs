@@ -2,7 +2,7 @@
 
 use crate::written::dicom::{self, EXPLICIT, Element, Syntax, Value, items, short, text};
 use crate::written::{Files, jpeg, stored, with};
-use bonepd_ct::image::calibration::GreyUnit;
+use bonepd_ct::format::calibration::GreyUnit;
 use bonepd_ct::image::scan;
 
 const POSITION: [u16; 2] = [0x20, 0x32];
@@ -188,10 +188,24 @@ fn the_unit_is_the_one_that_the_series_names() {
     ] {
         assert_eq!(stored(&files).unwrap().unit.as_deref(), unit);
         let hu = with(&files, |p| {
-            scan::read_as(p, &scan::Reading { unit: Some(GreyUnit::Hu), ..scan::Reading::default() }).is_ok()
+            scan::read_as(
+                p,
+                &scan::Reading {
+                    unit: Some(GreyUnit::Hu),
+                    ..scan::Reading::default()
+                },
+            )
+            .is_ok()
         });
         let mgha = with(&files, |p| {
-            scan::read_as(p, &scan::Reading { unit: Some(GreyUnit::Mgha), ..scan::Reading::default() }).is_ok()
+            scan::read_as(
+                p,
+                &scan::Reading {
+                    unit: Some(GreyUnit::Mgha),
+                    ..scan::Reading::default()
+                },
+            )
+            .is_ok()
         });
         assert_eq!((hu, mgha), (unit == Some("HU"), unit == Some("mg HA/cm3")));
     }

@@ -5,15 +5,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The table in the crate's root. `cli` and `main` are the binary: they see the library by its name only.
-const LAYERS: [(&str, u32); 24] = [
+const LAYERS: [(&str, u32); 25] = [
     ("error", 0),
     ("par", 0),
     ("simd", 0),
     ("grid", 1),
     ("volume", 2),
     ("io", 2),
-    ("image", 3),
+    ("format", 3),
     ("mask", 3),
+    ("image", 4),
     ("discretisation", 4),
     ("operator", 5),
     ("physics", 6),
@@ -33,7 +34,7 @@ const LAYERS: [(&str, u32); 24] = [
 ];
 
 /// What scan readers may import: a reader is of use outside this program.
-const READERS_SEE: [&str; 5] = ["image", "volume", "grid", "error", "io"];
+const READERS_SEE: [&str; 6] = ["image", "format", "volume", "grid", "error", "io"];
 
 /// Files and folders side by side in one folder.
 const MAX_ENTRIES: usize = 16;

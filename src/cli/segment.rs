@@ -3,9 +3,9 @@
 use super::{print_json, words};
 use bonepd_ct::command::Outcome;
 use bonepd_ct::error::Result;
+use bonepd_ct::format::calibration::GreyUnit;
 use bonepd_ct::grid::Axis;
 use bonepd_ct::image::array::headerless::Contents;
-use bonepd_ct::image::calibration::GreyUnit;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::segment::{Align, AlignBox, SegmentParams, Voi};
 use clap::Args;

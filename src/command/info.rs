@@ -1,9 +1,9 @@
 //! Owns `info`: what is known of a scan, without segmenting it.
 
 use crate::error::Result;
+use crate::format::calibration::{Calibration, GreyUnit};
+use crate::format::orient::Turn;
 use crate::image::array::headerless::Contents;
-use crate::image::calibration::{Calibration, GreyUnit};
-use crate::image::orient::Turn;
 use crate::image::scan;
 use crate::mask::{threshold, usable};
 use crate::pipeline::segment::implausible_voxels;

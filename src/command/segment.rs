@@ -2,8 +2,8 @@
 
 use crate::draw::picture;
 use crate::error::{Error, Result};
-use crate::image::calibration::GreyUnit;
-use crate::image::orient::Turn;
+use crate::format::calibration::GreyUnit;
+use crate::format::orient::Turn;
 use crate::image::scan::{self, Reading, Scan};
 use crate::io::atomic;
 use crate::machine::session::Session;

@@ -1,8 +1,8 @@
 //! Owns images for ParaView: VTK's XML image data (.vti) with cell data, compressed.
 
 use crate::error::Result;
+use crate::format::orient::column_norms;
 use crate::grid::Grid;
-use crate::image::orient::column_norms;
 use crate::io::atomic;
 use crate::volume::Volume;
 use flate2::Compression;

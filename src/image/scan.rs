@@ -1,11 +1,11 @@
 //! Owns the one way in: any scan, file or folder, to grey values on a grid in millimetres.
 
 use crate::error::{Error, Result};
+use crate::format::calibration::{Calibration, GreyUnit};
+use crate::format::orient::{self, Affine, Turn};
 use crate::grid::Grid;
 use crate::image::array::headerless::{self, Contents};
 use crate::image::array::npy;
-use crate::image::calibration::{Calibration, GreyUnit};
-use crate::image::orient::{self, Affine, Turn};
 use crate::image::scanco::{aim, isq};
 use crate::image::stored::Stored;
 use crate::image::{dicom, metaimage, nifti, nrrd, slices, tiff};

@@ -1,8 +1,8 @@
 //! Owns what a reader found in a file, before orientation and units are applied.
 
-use crate::image::calibration::Calibration;
+use crate::format::calibration::Calibration;
+use crate::format::orient::Affine;
 use crate::image::description::imagej::Grey;
-use crate::image::orient::Affine;
 
 /// What a reader found in a file, axes as stored.
 #[derive(Debug, Clone, Default)]

@@ -50,7 +50,7 @@ mod tests {
     /// moment, `t⁴`, where its volume goes with `t²`.
     #[test]
     fn a_bent_rod_has_a_sensitivity_of_two() {
-        let n = 40;
+        let n = 100;
         let element = |i: usize| {
             let (x, y) = (i % n, i / n);
             let at = (y as f64 + 0.5) / n as f64 - 0.5;
@@ -61,7 +61,8 @@ mod tests {
             }
         };
         let found = surface_energy((0..n * n).map(element)).unwrap();
-        assert!((found.sensitivity - 2.0).abs() < 0.06, "{found:?}");
+        // The outermost elements' centres lie half an element inside: 3 % less at 100 elements.
+        assert!((found.sensitivity - 2.0).abs() < 0.04, "{found:?}");
         // Mean of y⁴ over the square of the mean of y².
         assert!((found.spread - 9.0 / 5.0).abs() < 0.01, "{found:?}");
     }

@@ -1,7 +1,7 @@
 //! Owns the segmented scan on disk: `mask.nii.gz` and `segment.json`, written and read back.
 
 use crate::error::{Error, Result};
-use crate::image::orient::{self, Turn};
+use crate::format::orient::{self, Turn};
 use crate::image::{nifti, scan};
 use crate::io::atomic;
 pub use crate::io::own_files::{GREY, MASK, PICTURE, RECORD, VOI};

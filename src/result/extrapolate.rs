@@ -258,6 +258,7 @@ mod tests {
             key: Settings {
                 method,
                 boundary,
+                elements: (method == Method::VoxelFe).then_some(Elements::Voxels),
                 lp_mm: size,
                 voxel_mm: [0.02; 3],
                 tv_mm3: 64.0,

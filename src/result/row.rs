@@ -172,7 +172,10 @@ mod tests {
             ),
             "{line}"
         );
-        assert!(line.ends_with(",2.5,0.5,NA,NA,NA,1.25"), "{line}");
+        assert!(
+            line.ends_with(",2.5,0.5,NA,NA,NA,1.25,NA,NA,NA,NA"),
+            "{line}"
+        );
     }
 
     #[test]

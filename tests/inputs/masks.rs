@@ -1,8 +1,8 @@
 //! Masks of other files on scans that lie any way in the world: each voxel of the mask on its voxel of the scan.
 
 use super::write::{Order, Page, tiff};
+use bonepd_ct::format::orient::{Affine, Turn, turned};
 use bonepd_ct::grid::Grid;
-use bonepd_ct::image::orient::{Affine, Turn, turned};
 use bonepd_ct::image::{nifti, scan};
 use bonepd_ct::pipeline::segment::laid;
 use bonepd_ct::volume::Volume;

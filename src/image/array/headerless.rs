@@ -1,7 +1,7 @@
 //! Owns files of voxels without a header (`.raw`, `.vol`): what is in them is given on the command line.
 
 use crate::error::{Error, Result};
-use crate::image::raw::{self, Layout, Scalar};
+use crate::format::raw::{self, Layout, Scalar};
 use crate::image::stored::Stored;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};

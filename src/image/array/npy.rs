@@ -5,10 +5,10 @@
 //! dimensions.
 
 use crate::error::{Error, Result};
+use crate::format::orient::{Turn, turned};
+use crate::format::raw;
+use crate::format::raw::{Layout, Scalar};
 use crate::grid::Grid;
-use crate::image::orient::{Turn, turned};
-use crate::image::raw;
-use crate::image::raw::{Layout, Scalar};
 use crate::image::stored::Stored;
 use crate::volume::Volume;
 use std::fs::File;

@@ -34,7 +34,7 @@
 //! | min | harmless |
 //! | max | harmless |
 
-use crate::image::description::length::{is_pixel, millimetres_per};
+use crate::format::length::{is_pixel, millimetres_per};
 
 /// The notes of one file. 0 where a count is not in them.
 #[derive(Debug, Default, Clone, PartialEq)]

@@ -28,7 +28,7 @@
 //! Elements: several `Image` are refused; `TiffData` (IFD, FirstZ, FirstT, PlaneCount) orders the pages; one whose `UUID` names
 //! several files, and `BinaryOnly`, are refused: the rest of the scan is elsewhere.
 
-use crate::image::description::length::{is_pixel, millimetres_per};
+use crate::format::length::{is_pixel, millimetres_per};
 use roxmltree::{Document, Node};
 use std::collections::BTreeSet;
 

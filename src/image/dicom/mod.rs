@@ -70,7 +70,7 @@ mod stack;
 mod walk;
 
 use crate::error::{Error, Result};
-use crate::image::orient::{Affine, from_lps, scaled};
+use crate::format::orient::{Affine, from_lps, scaled};
 use crate::image::stored::Stored;
 use frames::{Frame, normal};
 use head::{Found, Image};
@@ -164,7 +164,7 @@ fn check_size(images: &[Image], slices: usize) -> Result<()> {
     let (rows, columns) = (images[0].rows, images[0].columns);
     let promised = (rows * columns).saturating_mul(slices) as u64;
     // Neither deflate nor run lengths nor JPEG pack more densely.
-    if promised <= on_disk.saturating_mul(crate::image::raw::MAX_EXPANSION) {
+    if promised <= on_disk.saturating_mul(crate::format::raw::MAX_EXPANSION) {
         return Ok(());
     }
     Err(Error::file(

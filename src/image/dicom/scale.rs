@@ -4,7 +4,7 @@ use super::ADVICE;
 use super::coding::{Scale, Table};
 use super::elements::{Set, Tag};
 use crate::error::{Error, Result};
-use crate::image::calibration::unit_named;
+use crate::format::calibration::unit_named;
 use std::path::Path;
 
 /// The functional group of enhanced files that holds the scale.

@@ -4,7 +4,7 @@ use super::ADVICE;
 use super::frames::{Frame, dot, normal};
 use super::head::Image;
 use crate::error::{Error, Result};
-use crate::image::orient;
+use crate::format::orient;
 
 /// Sorts the slices of a series and gives their distance in mm, where it is known.
 ///

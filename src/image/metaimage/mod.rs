@@ -46,9 +46,9 @@ mod data;
 mod header;
 
 use crate::error::{Error, Result};
-use crate::image::length;
-use crate::image::orient::{Affine, column_norms, from_lps, scaled};
-use crate::image::raw::{Layout, Scalar};
+use crate::format::length;
+use crate::format::orient::{Affine, column_norms, from_lps, scaled};
+use crate::format::raw::{Layout, Scalar};
 use crate::image::stored::Stored;
 use header::Header;
 use std::path::{Path, PathBuf};

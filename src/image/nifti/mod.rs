@@ -61,7 +61,7 @@ pub use header::decimal;
 pub use write::write;
 
 use crate::error::{Error, Result};
-use crate::image::raw::{self, Layout, Scalar};
+use crate::format::raw::{self, Layout, Scalar};
 use crate::image::stored::Stored;
 use header::{Header, Version};
 use std::ffi::OsString;

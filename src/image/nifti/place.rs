@@ -2,8 +2,8 @@
 
 use super::header::{Header, Version};
 use crate::error::{Error, Result};
-use crate::image::length;
-use crate::image::orient::{Affine, column_norms};
+use crate::format::length;
+use crate::format::orient::{Affine, column_norms};
 use std::path::Path;
 
 /// Spacing and affine in millimetres.

@@ -3,8 +3,8 @@
 use super::ADVICE;
 use super::header::Header;
 use crate::error::{Error, Result};
-use crate::image::length;
-use crate::image::orient::{Affine, column_norms};
+use crate::format::length;
+use crate::format::orient::{Affine, column_norms};
 use std::path::Path;
 
 pub struct Axes {

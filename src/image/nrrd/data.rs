@@ -3,8 +3,8 @@
 use super::ADVICE;
 use super::header::Header;
 use crate::error::{Error, Result};
-use crate::image::raw::pattern;
-use crate::image::raw::{self, Layout};
+use crate::format::raw::pattern;
+use crate::format::raw::{self, Layout};
 use bzip2::bufread::MultiBzDecoder;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};

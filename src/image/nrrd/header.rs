@@ -2,7 +2,7 @@
 
 use super::ADVICE;
 use crate::error::{Error, Result};
-use crate::image::raw;
+use crate::format::raw;
 use std::io::BufRead;
 use std::path::Path;
 

@@ -41,8 +41,8 @@ mod data;
 mod header;
 
 use crate::error::{Error, Result};
-use crate::image::calibration::unit_named;
-use crate::image::raw::{Layout, Scalar};
+use crate::format::calibration::unit_named;
+use crate::format::raw::{Layout, Scalar};
 use crate::image::stored::Stored;
 use header::Header;
 use std::path::{Path, PathBuf};

@@ -2,9 +2,9 @@
 //! Layout after AimIO (Nodwell, Numerics88). Names of persons in the processing log are not taken over.
 
 use crate::error::{Error, Result};
-use crate::image::calibration::Calibration;
-use crate::image::raw;
-use crate::image::raw::{Layout, Scalar};
+use crate::format::calibration::Calibration;
+use crate::format::raw;
+use crate::format::raw::{Layout, Scalar};
 use crate::image::scanco::{i32_at, i64_at, vax_f32};
 use crate::image::stored::Stored;
 use std::io::Read;

@@ -2,9 +2,9 @@
 //! the header is not taken over.
 
 use crate::error::{Error, Result};
-use crate::image::calibration::Calibration;
-use crate::image::raw;
-use crate::image::raw::{Layout, Scalar};
+use crate::format::calibration::Calibration;
+use crate::format::raw;
+use crate::format::raw::{Layout, Scalar};
 use crate::image::scanco::{i32_at, vax_f64};
 use crate::image::stored::Stored;
 use std::path::Path;
@@ -87,7 +87,7 @@ fn calibration(mu_scaling: f64, extended: &[u8]) -> Calibration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::calibration::GreyUnit;
+    use crate::format::calibration::GreyUnit;
 
     /// A file as the format is described, with calibration in VAX G floats of exact binary values.
     fn isq() -> Vec<u8> {

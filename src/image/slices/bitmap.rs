@@ -4,8 +4,8 @@
 //! value, in both formats. Colours are read where red, green and blue are equal, with all their bits, and refused otherwise.
 
 use crate::error::{Error, Result};
+use crate::format::raw::MAX_EXPANSION;
 use crate::image::description::imagej::Grey;
-use crate::image::raw::MAX_EXPANSION;
 use crate::image::stored::Slice;
 use image::DynamicImage;
 use std::path::Path;

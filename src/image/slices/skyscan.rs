@@ -19,7 +19,7 @@
 //! | Acquisition | Scaled Image Pixel Size (um) | harmless: of the projections on the screen |
 //! | System | Camera Pixel Size (um) | harmless: of the camera |
 
-use crate::image::raw;
+use crate::format::raw;
 use std::path::{Path, PathBuf};
 
 /// What a log says of the voxels.

@@ -1,6 +1,6 @@
 //! Owns how the bytes of one strip or tile become sample values: bit order, compression, differences, packing.
 
-use crate::image::raw::{self, Layout, Scalar};
+use crate::format::raw::{self, Layout, Scalar};
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 use weezl::BitOrder;

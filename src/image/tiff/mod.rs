@@ -11,8 +11,8 @@ pub mod tags;
 pub mod directories;
 
 use crate::error::{Error, Result};
+use crate::format::raw::{self, Layout};
 use crate::image::description::imagej::Grey;
-use crate::image::raw::{self, Layout};
 use crate::image::stored::{self, Slice, Stored};
 use crate::volume::Volume;
 use chunks::{Fault, Places};

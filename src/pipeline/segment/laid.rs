@@ -4,8 +4,8 @@
 //! the same array: their axes as stored are the same, and the scan's turn is the other's, too.
 
 use crate::error::{Error, Result};
+use crate::format::orient::{self, Affine};
 use crate::grid::Grid;
-use crate::image::orient::{self, Affine};
 use crate::image::scan::{self, Scan};
 use crate::image::stored::Stored;
 use crate::volume::Volume;

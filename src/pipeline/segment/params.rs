@@ -1,9 +1,9 @@
 //! Owns the settings of segmentation, and which of them contradict each other.
 
 use crate::error::{Error, Result};
+use crate::format::calibration::GreyUnit;
 use crate::grid::Axis;
 use crate::image::array::headerless::Contents;
-use crate::image::calibration::GreyUnit;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
 

@@ -26,6 +26,9 @@ const USUAL_SENSITIVITY: f64 = 4.0 / 3.0;
 /// σ in voxels of the blurred images of the truth set: 0.7 of the scanner, 0.5 of the smoothing.
 const TRUTH_SET_BLUR: f64 = 0.86;
 
+/// Shape error of one element a voxel of a mask, relative and over `S`.
+const OF_A_MASK: f64 = 0.17;
+
 /// What is known of the surface within a voxel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Image {
@@ -84,7 +87,8 @@ pub fn of_one_solve(image: Image, elements: Elements, size: f64, surface: f64) -
             let blurred = (blur_voxels / TRUTH_SET_BLUR).max(0.0);
             (0.10 + 0.06 * blurred, 0.05)
         }
-        (Elements::Voxels | Elements::BlockMeans, Image::Mask) => (0.13, 0.05),
+        // The blur of the scan it came from is not known, so that of a blurred one is taken.
+        (Elements::Voxels | Elements::BlockMeans, Image::Mask) => (OF_A_MASK, 0.05),
         // Not measured by itself: no better than one element a voxel.
         (Elements::InterpolatedGrey | Elements::BlockMeans, Image::Grey { blur_voxels }) => {
             let blurred = (blur_voxels / TRUTH_SET_BLUR).max(0.0);
@@ -104,7 +108,7 @@ pub fn of_one_solve(image: Image, elements: Elements, size: f64, surface: f64) -
 pub fn of_lattice(row: &Row) -> Option<f64> {
     let voxel_mm = row.key.voxel_mm.iter().product::<f64>().cbrt();
     let thickness = row.marks.mean_thickness_mm? / voxel_mm;
-    Some(0.13 * surface(None, thickness))
+    Some(OF_A_MASK * surface(None, thickness))
 }
 
 /// Puts the stated parts into a row, as shares of its modulus.

@@ -1,7 +1,7 @@
 //! Owns the assembly of a page from its strips or tiles.
 
-use super::codec;
 use super::storage::{Pixel, Storage};
+use crate::format::strips;
 use std::io::{Read, Seek, SeekFrom};
 
 /// Why a page has no grey values.
@@ -97,7 +97,7 @@ fn chunk<R: Read + Seek>(
     let wanted = row_bytes.checked_mul(rows).ok_or_else(too_large)?;
     // Some programs write no size, or a wrong one, of what is not compressed.
     let packed_bytes = match storage.compression {
-        codec::NONE => wanted as u64,
+        strips::NONE => wanted as u64,
         _ => bytes,
     };
     source
@@ -107,15 +107,15 @@ fn chunk<R: Read + Seek>(
     let mut part = Read::by_ref(source).take(packed_bytes);
     part.read_to_end(&mut packed).map_err(|e| e.to_string())?;
     if storage.reversed_bits {
-        codec::reverse_bits(&mut packed);
+        strips::reverse_bits(&mut packed);
     }
-    let mut raw = codec::unpacked(storage.compression, packed, wanted)?;
+    let mut raw = strips::unpacked(storage.compression, packed, wanted)?;
     raw.truncate(wanted);
     match storage.predictor {
         1 => {}
-        2 => codec::add_up(&mut raw, row_bytes, &samples)?,
+        2 => strips::add_up(&mut raw, row_bytes, &samples)?,
         3 => {
-            codec::gather_floats(&mut raw, row_bytes, &samples)?;
+            strips::gather_floats(&mut raw, row_bytes, &samples)?;
             samples.big_endian = true;
         }
         other => return Err(format!("predictor {other} is not known").into()),

@@ -2,7 +2,6 @@
 //! ImageJ and OME write into the description in [`crate::image::description`].
 
 mod chunks;
-mod codec;
 mod described;
 mod scale;
 mod storage;
@@ -12,11 +11,11 @@ pub mod directories;
 
 use crate::error::{Error, Result};
 use crate::format::raw::{self, Layout};
+use crate::format::strips::{self, Samples};
 use crate::image::description::imagej::Grey;
 use crate::image::stored::{self, Slice, Stored};
 use crate::volume::Volume;
 use chunks::{Fault, Places};
-use codec::Samples;
 use described::{Described, described};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
@@ -374,7 +373,7 @@ fn contiguous(pages: &mut Pages, path: &Path, storage: &Storage, nz: usize) -> R
     let Samples {
         big_endian, count, ..
     } = storage.samples;
-    let plain = storage.compression == codec::NONE
+    let plain = storage.compression == strips::NONE
         && count == 1
         && !storage.reversed_bits
         && storage.chunk[0] == storage.width;

@@ -1,8 +1,8 @@
 //! Owns how one page of a TIFF file is stored, by its tags ([`super::tags`]), and what is refused of it.
 
-use super::codec::{self, Samples};
 use super::{Pages, damaged, unread};
 use crate::error::Result;
+use crate::format::strips::{self, Samples};
 use std::path::Path;
 use tiff::tags::Tag;
 
@@ -135,7 +135,7 @@ impl Storage {
 
     /// Whether the decoder of the crate is used, which inverts what shows 0 as white.
     pub fn by_crate(&self) -> bool {
-        matches!(self.compression, codec::CCITT_GROUP_4 | codec::JPEG)
+        matches!(self.compression, strips::CCITT_GROUP_4 | strips::JPEG)
     }
 }
 
@@ -157,7 +157,7 @@ pub fn storage(pages: &mut Pages, path: &Path, from_imagej: bool) -> Result<Stor
     let samples = samples(pages, path)?;
     let photometric = number(pages, Tag::PhotometricInterpretation).unwrap_or(1);
     let pixel = pixel(pages, path, photometric, &samples, from_imagej)?;
-    let compression = number(pages, Tag::Compression).unwrap_or(codec::NONE);
+    let compression = number(pages, Tag::Compression).unwrap_or(strips::NONE);
     let chunk = match number(pages, Tag::TileWidth) {
         Some(tile) => [tile, number(pages, Tag::TileLength).unwrap_or(1)].map(|n| n as usize),
         None => {
@@ -343,14 +343,14 @@ fn refuse_compression(storage: &Storage, path: &Path) -> Result<()> {
     let compression = storage.compression;
     let single = storage.samples.count == 1 && !storage.reversed_bits;
     let by_crate = storage.by_crate() && single && matches!(storage.pixel, Pixel::Grey);
-    if codec::is_read(compression) || by_crate {
+    if strips::is_read(compression) || by_crate {
         return Ok(());
     }
     Err(unread(
         path,
         &format!(
             "is compressed by {}, which is not read",
-            codec::name(compression)
+            strips::name(compression)
         ),
         "save it uncompressed, or with deflate (ZIP) or LZW",
     ))

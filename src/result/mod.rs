@@ -2,6 +2,7 @@
 
 pub mod extrapolate;
 pub mod ffb;
+pub mod notes;
 pub mod row;
 pub mod settings;
 pub mod statistics;

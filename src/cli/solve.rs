@@ -2,7 +2,7 @@
 
 use super::settings::{LatticeSettings, TissueSettings};
 use super::{print_json, words};
-use bonepd_ct::command::Outcome;
+use bonepd_ct::command::{Outcome, run_settings};
 use bonepd_ct::error::Result;
 use bonepd_ct::grid::Axis;
 use bonepd_ct::machine::session::Session;
@@ -122,7 +122,7 @@ impl SolveSettings {
 }
 
 pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
-    let mut params = SolveParams::default();
+    let mut params = start(args, session);
     args.settings.apply(&mut params)?;
     let mut lattice = bonepd_ct::command::lattice::settings(&args.dir)?;
     args.lattice.apply(&mut lattice)?;
@@ -140,6 +140,9 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
             (rows, true)
         }
     };
+    if !session.dry_run {
+        bonepd_ct::command::answer::keep(&args.dir, &rows, args.error)?;
+    }
     if json {
         print_json(&rows);
     }
@@ -149,4 +152,17 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
             false => Outcome::Done,
         },
     )
+}
+
+/// The settings that options are laid over: those of the run that the folder belongs to, else the defaults.
+fn start(args: &SolveArgs, session: &Session) -> SolveParams {
+    let Some((path, params)) = run_settings::of_run(&args.dir) else {
+        return SolveParams::default();
+    };
+    session.say(format!(
+        "note: settings of the run ({}) are taken, options here win: {}",
+        path.display(),
+        run_settings::in_words(&params)
+    ));
+    params
 }

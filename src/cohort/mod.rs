@@ -1,14 +1,17 @@
 //! Owns `run`: one recipe over scans and folders of scans, each scan on its own.
 
+pub mod earlier;
 pub mod job;
 pub mod manifest;
+mod plan;
 pub mod queue;
 pub mod scans;
 
 use crate::cohort::job::ScanJob;
 use crate::cohort::scans::Selection;
-use crate::command::estimate::{Estimate, estimate, of_specimen};
-use crate::command::{Outcome, adaptive, lattice, report, segment, solve};
+use crate::command::estimate::{Estimate, estimate};
+use crate::command::in_words::answer_in_words;
+use crate::command::{Outcome, adaptive, answer, lattice, report, segment, solve};
 use crate::error::{Error, Result};
 use crate::io::{atomic, table};
 use crate::machine::host;
@@ -18,8 +21,8 @@ use crate::record::failures;
 use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::results::Results;
+use crate::result::answer::{ScanFacts, best, line};
 use crate::result::row::Row;
-use crate::result::settings::BoundaryRule;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -65,7 +68,9 @@ pub fn cohort(
     let mut segment = recipe.segment.clone();
     segment.keep_grey |= recipe.solve.material.is_some();
     let all = scans::find(inputs, &segment, selection, session)?;
-    let names = all.iter().map(|job| job.name.clone()).collect();
+    let mut names = earlier::names(out, &all);
+    earlier::say(&names, session);
+    names.extend(all.iter().map(|job| job.name.clone()));
     let jobs = match only {
         Some(name) => scans::only(&all, name)?,
         None => all,
@@ -75,19 +80,21 @@ pub fn cohort(
         .map(|job| estimate(&job.input, job.segment.spacing_mm, recipe))
         .collect();
     if session.dry_run {
-        let results = plan(recipe, &jobs, &estimates, out, session);
+        let results = plan::plan(recipe, &jobs, &estimates, out, session);
         return Ok((outcome(&results), results));
     }
     atomic::sweep(out);
+    let session = &session.with_warnings_once();
     let run = Run {
         recipe,
         out,
         names,
         jobs: &jobs,
         session,
-        bar: session.bar(jobs.len() as u64, "scans"),
+        bar: session.bar(jobs.len() as u64, "all scans"),
         done: Mutex::new(vec![None; jobs.len()]),
     };
+    run.bar.set_message(format!("0 of {} scans done", jobs.len()));
     let memory: Vec<f64> = estimates.iter().map(|e| e.memory_mib).collect();
     let limit = resources
         .memory_mib
@@ -99,6 +106,7 @@ pub fn cohort(
         |i| run.scan(i),
     );
     run.bar.finish_and_clear();
+    session.repeated_warnings();
     run.finish(&estimates)
 }
 
@@ -127,6 +135,7 @@ impl Run<'_> {
             env!("CARGO_PKG_VERSION"),
             job.input.display()
         ));
+        let before: Vec<Row> = table::read(&dir.join(results::TABLE)).unwrap_or_default();
         let solved = catch_unwind(AssertUnwindSafe(|| steps(self.recipe, job, &dir, &own)))
             .unwrap_or_else(|_| {
                 Err(Error::specimen(
@@ -137,8 +146,12 @@ impl Run<'_> {
         match &solved {
             Ok(rows) => {
                 own.note("done");
-                self.session
-                    .say(format!("{}: {}", job.name, in_words(rows)));
+                let place = format!("{} ({} of {})", job.name, i + 1, self.jobs.len());
+                self.session.result(format!(
+                    "{place}: {}{}",
+                    in_words(rows),
+                    said_of_kept(rows, &before)
+                ));
             }
             Err(e) => {
                 own.note(&format!("failed: {e}"));
@@ -157,20 +170,19 @@ impl Run<'_> {
             self.session.warn(e.to_string());
         }
         self.bar.inc(1);
+        let finished = done.iter().flatten().count();
+        self.bar
+            .set_message(format!("{finished} of {} scans done", done.len()));
     }
 
-    /// All rows so far, in the order of the scans.
+    /// All rows so far, in the order of the scans: all that the folders of the scans hold, also of earlier runs.
     fn write_rows(&self, done: &[Option<Result<Vec<Row>>>]) -> Result<Vec<Row>> {
         let mut rows = Vec::new();
         for name in &self.names {
-            match self.job(name) {
-                Some(i) => rows.extend(done[i].iter().flatten().flatten().cloned()),
-                None => {
-                    let file = self.out.join(name).join(results::TABLE);
-                    if file.is_file() {
-                        rows.extend(table::read::<Row>(&file)?);
-                    }
-                }
+            let is_done = |i: usize| matches!(done[i], Some(Ok(_)));
+            let file = self.out.join(name).join(results::TABLE);
+            if self.job(name).is_none_or(is_done) && file.is_file() {
+                rows.extend(table::read::<Row>(&file)?);
             }
         }
         match rows.is_empty() {
@@ -178,6 +190,22 @@ impl Run<'_> {
             false => results::write_table(self.out, &rows)?,
         }
         Ok(rows)
+    }
+
+    /// The recipe as it is run. One of an earlier run that differs is kept beside it.
+    fn write_recipe(&self) -> Result<String> {
+        let recipe = toml::to_string(self.recipe).expect("settings are plain data");
+        let file = self.out.join(report::RECIPE);
+        if std::fs::read_to_string(&file).is_ok_and(|old| old != recipe) {
+            let _ = std::fs::rename(&file, self.out.join(report::OLD_RECIPE));
+            self.session.say(format!(
+                "note: an earlier run in {} had another recipe: its rows are kept beside the new ones, the recipe is {}",
+                self.out.display(),
+                report::OLD_RECIPE
+            ));
+        }
+        atomic::write(&file, &recipe)?;
+        Ok(recipe)
     }
 
     fn job(&self, name: &str) -> Option<usize> {
@@ -198,11 +226,13 @@ impl Run<'_> {
         failures.extend(known.filter(|failure| left_out(&failure.scan)));
         failures::write_failures(self.out, &failures)?;
         if !rows.is_empty() {
-            let recipe = toml::to_string(self.recipe).expect("settings are plain data");
-            atomic::write(&self.out.join(report::RECIPE), &recipe)?;
+            let recipe = self.write_recipe()?;
             let dirs = [self.out.to_path_buf()];
+            let answers = report::answers(&rows, &dirs, self.recipe.error);
+            table::write(&self.out.join(report::ANSWERS), &answers.lines)?;
             report::write(
                 &rows,
+                answers,
                 &failures,
                 &self.recipe.report,
                 &dirs,
@@ -210,6 +240,7 @@ impl Run<'_> {
                 &self.out.join("report"),
                 self.session,
             )?;
+            self.say_where();
         }
         let results: Vec<ScanResult> = self
             .jobs
@@ -218,9 +249,36 @@ impl Run<'_> {
             .zip(done.drain(..))
             .map(|((job, estimate), solved)| result(job, *estimate, solved, self.recipe.error))
             .collect();
+        self.say_what_fell_short(&results);
         Ok((outcome(&results), results))
     }
+
+    fn say_where(&self) {
+        self.session.result(format!(
+            "answers, one line a scan: {}; page: {}",
+            self.out.join(report::ANSWERS).display(),
+            self.out.join("report/report.html").display()
+        ));
+    }
+
+    /// Names the scans that fell short.
+    fn say_what_fell_short(&self, results: &[ScanResult]) {
+        for state in [NOT_CONVERGED, NOT_MET] {
+            let names: Vec<&str> = results
+                .iter()
+                .filter(|r| r.state == state)
+                .map(|r| r.scan.as_str())
+                .collect();
+            if !names.is_empty() {
+                self.session.warn(format!("{state}: {}", names.join(", ")));
+            }
+        }
+    }
 }
+
+/// States of a scan that ends a run with exit code 1.
+const NOT_CONVERGED: &str = "not converged";
+const NOT_MET: &str = "error not met";
 
 /// The steps of one scan.
 fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Result<Vec<Row>> {
@@ -237,6 +295,7 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
         row.marks.subject.clone_from(&job.subject);
     }
     Results::open(dir, false)?.label(&job.group, &job.subject)?;
+    answer::keep(dir, &rows, recipe.error)?;
     Ok(rows)
 }
 
@@ -252,24 +311,29 @@ fn failures(jobs: &[ScanJob], done: &[Option<Result<Vec<Row>>>]) -> Vec<Failure>
     failed.collect()
 }
 
-/// How many rows, and the modulus of the last: the mean or the limit of the finest lattices, where there are several.
+/// The answer, how many rows, and how many of them did not converge.
 fn in_words(rows: &[Row]) -> String {
     let stalled = rows.iter().filter(|row| row.converged() == Some(false));
     let stalled = match stalled.count() {
         0 => String::new(),
         n => format!(", {n} not converged"),
     };
-    let modulus = rows.last().and_then(|row| {
-        let key = &row.key;
-        let kind = key.boundary.map_or(key.method.name(), BoundaryRule::name);
-        let e_app = row.e_app_mpa()?;
-        Some(format!("; {kind} {} mm: E_app {e_app:.3} MPa", key.lp_mm))
-    });
+    let answer = best(rows).map(|row| answer_in_words(&line(row, &ScanFacts::default())));
     format!(
-        "{} rows{stalled}{}",
-        rows.len(),
-        modulus.unwrap_or_default()
+        "{}; {} rows{stalled}",
+        answer.unwrap_or("no modulus".to_owned()),
+        rows.len()
     )
+}
+
+/// Whether all that was solved is what an earlier run left.
+fn said_of_kept(rows: &[Row], before: &[Row]) -> &'static str {
+    let mut solved = rows.iter().filter(|row| !row.key.is_derived()).peekable();
+    let kept = |row: &Row| before.iter().any(|old| old.key == row.key && old.solved == row.solved);
+    match solved.peek().is_some() && solved.all(kept) {
+        true => "  [up to date: kept from an earlier run]",
+        false => "",
+    }
 }
 
 /// `target`: the stated error asked for, if any.
@@ -284,9 +348,9 @@ fn result(
         target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
     };
     let (state, error, rows) = match solved {
-        Some(Ok(rows)) if missed(&rows) => ("error not met", None, rows.len()),
+        Some(Ok(rows)) if missed(&rows) => (NOT_MET, None, rows.len()),
         Some(Ok(rows)) if rows.iter().any(|row| row.converged() == Some(false)) => {
-            ("not converged", None, rows.len())
+            (NOT_CONVERGED, None, rows.len())
         }
         Some(Ok(rows)) => ("done", None, rows.len()),
         Some(Err(e)) => ("failed", Some(e.to_string()), 0),
@@ -305,7 +369,7 @@ fn result(
 fn outcome(results: &[ScanResult]) -> Outcome {
     let in_state = |state: &'static str| results.iter().filter(move |r| r.state == state);
     let failed: Vec<String> = in_state("failed").map(|r| r.scan.clone()).collect();
-    let short = ["not converged", "error not met"];
+    let short = [NOT_CONVERGED, NOT_MET];
     match (
         failed.is_empty(),
         short.iter().any(|s| in_state(s).next().is_some()),
@@ -314,59 +378,4 @@ fn outcome(results: &[ScanResult]) -> Outcome {
         (true, true) => Outcome::NotConverged,
         (true, false) => Outcome::Done,
     }
-}
-
-/// What would run. Every scan is read and segmented, so what its solves need is known.
-fn plan(
-    recipe: &Recipe,
-    jobs: &[ScanJob],
-    estimates: &[Estimate],
-    out: &Path,
-    session: &Session,
-) -> Vec<ScanResult> {
-    let bar = session.bar(jobs.len() as u64, "scans");
-    let mut results = Vec::new();
-    for (job, first) in jobs.iter().zip(estimates) {
-        let to = out.join(&job.name);
-        let quiet = Session {
-            quiet: true,
-            ..session.clone()
-        };
-        let known = segment::in_memory(&job.input, Some(&job.name), &job.segment, &quiet)
-            .and_then(|specimen| of_specimen(&specimen, first, recipe));
-        bar.inc(1);
-        let estimate = *known.as_ref().unwrap_or(first);
-        results.push(match &known {
-            Ok(e) => {
-                let (to, from) = (to.display(), job.input.display());
-                session.say(format!("{to} <- {from}: {e}"));
-                result(job, estimate, None, None)
-            }
-            Err(e) => {
-                session.warn(format!("{} would fail: {e}", job.name));
-                result(job, estimate, Some(Err(e.clone())), None)
-            }
-        });
-        if let Some(free) = host::available_mib().filter(|free| *free < estimate.memory_mib) {
-            session.warn(format!("{} will not fit: {free:.0} MiB are free", job.name));
-        }
-    }
-    bar.finish_and_clear();
-    let estimates: Vec<Estimate> = results.iter().map(|r| r.estimate).collect();
-    let seconds = estimates.iter().filter_map(|e| e.time_s).sum::<f64>();
-    let time = match seconds {
-        s if s < 90.0 => format!("{s:.0} s"),
-        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
-    };
-    let untold = estimates.iter().filter(|e| e.time_s.is_none()).count();
-    let rest = match untold {
-        0 => String::new(),
-        n => format!(", and {n} whose time is not known before reading"),
-    };
-    session.say(format!(
-        "scans: {}; about {time} one after the other{rest}",
-        jobs.len()
-    ));
-    results
 }

@@ -229,7 +229,14 @@ fn descend(
 
 /// Names become folders beside the run's own files.
 fn refuse_names(jobs: &[ScanJob]) -> Result<()> {
-    const OWN: [&str; 4] = ["report", "results.csv", "recipe.toml", "failed.csv"];
+    const OWN: [&str; 6] = [
+        "report",
+        "results.csv",
+        "answers.csv",
+        "recipe.toml",
+        "recipe.old.toml",
+        "failed.csv",
+    ];
     let path_like = |name: &str| name.contains(['/', '\\', '\0']) || [".", ".."].contains(&name);
     for job in jobs {
         let name = job.name.as_str();

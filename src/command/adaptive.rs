@@ -5,7 +5,8 @@
 
 use crate::command::ladder::{PAIRS, element_mm, suffices, voxel_fe};
 use crate::command::segment::load;
-use crate::command::solve::{in_words, solve};
+use crate::command::in_words::in_words;
+use crate::command::solve::solve;
 use crate::error::Result;
 use crate::machine::session::Session;
 use crate::measure::thickness::plate_thickness_mm;
@@ -174,14 +175,14 @@ fn finish(dir: &Path, mut rows: Vec<Row>, target: f64, session: &Session) -> Res
     }
     let met = meets(&rows, target);
     match best(&rows) {
-        Some((row, error)) if met => session.say(format!(
+        Some((row, error)) if met => session.result(format!(
             "error {} of {} asked for: {}",
             percent(error),
             percent(target),
             in_words(row)
         )),
         Some((row, error)) => session.warn(format!(
-            "the error asked for, {}, could not be met: the least that can be stated is {} ({})",
+            "cannot reach the error asked for, {}: the best is {} ({})",
             percent(target),
             percent(error),
             in_words(row)

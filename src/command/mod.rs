@@ -1,16 +1,21 @@
 //! Recipes on real scans: each verb of the program is one function here, from paths and settings to files.
 
 pub mod adaptive;
+pub mod answer;
 pub mod estimate;
+mod fields;
+pub mod in_words;
 pub mod info;
 mod ladder;
 pub mod lattice;
 pub mod phantom;
 pub mod report;
+pub mod run_settings;
 pub mod scene;
 pub mod segment;
 pub mod solve;
 pub mod stiffness;
+mod stiffness_page;
 
 /// How a command ended when nothing stopped it. Everything else is an [`crate::error::Error`] (exit 2).
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,7 +1,11 @@
 //! Owns `report` on disk: rows of any number of solved scans in; tables, plots and pages out.
 
+use crate::command::answer;
+use crate::command::stiffness::RECORD;
+use crate::command::stiffness_page;
 use crate::error::Result;
 use crate::grid::Axis;
+use crate::image::scan;
 use crate::io::{atomic, table};
 use crate::machine::host;
 use crate::machine::session::Session;
@@ -11,16 +15,26 @@ use crate::record::collect_rows::Solved;
 use crate::record::failures::Failure;
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
+use crate::record::stiffness;
+use crate::report::answers;
+use crate::report::answers::Answers;
 use crate::report::html;
 use crate::report::html::{ScanPage, Source};
 use crate::report::{Report, ReportParams, report as assemble};
 use crate::report::{markdown, plot};
+use crate::result::answer::ScanFacts;
 use crate::result::ffb::with_ffb;
 use crate::result::row::Row;
 use std::path::{Path, PathBuf};
 
 /// The recipe as it was run, in the output folder of a run.
 pub const RECIPE: &str = "recipe.toml";
+
+/// The recipe of an earlier run into the same folder, where it differs.
+pub const OLD_RECIPE: &str = "recipe.old.toml";
+
+/// One line a scan.
+pub const ANSWERS: &str = "answers.csv";
 
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Scans that
 /// were solved again in their own folders after the run are read from there. Returns the files written.
@@ -40,12 +54,27 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
         .map_or_else(ReportParams::default, |recipe| recipe.report);
     // Means of older programs do not say whether they are converged.
     let rows = with_ffb(&rows);
-    write(&rows, &failures, &params, dirs, recipe, out, session)
+    let answers = answers(&rows, dirs, None);
+    write(&rows, answers, &failures, &params, dirs, recipe, out, session)
+}
+
+/// The answers of `rows`, with what the folders of the scans, under `dirs`, say of them. `target` is the relative error asked for;
+/// without it that of each scan's last solve.
+pub fn answers(rows: &[Row], dirs: &[PathBuf], target: Option<f64>) -> Answers {
+    answers::answers(rows, |scan| {
+        let facts = folder(scan, dirs).map_or_else(ScanFacts::default, |(dir, _)| answer::facts(&dir));
+        ScanFacts {
+            target: target.or(facts.target),
+            ..facts
+        }
+    })
 }
 
 /// Writes the report of `rows` into `out`. `dirs` are searched for what is known of the scans.
+#[expect(clippy::too_many_arguments, reason = "what a report is of, one by one")]
 pub fn write(
     rows: &[Row],
+    answers: Answers,
     failures: &[Failure],
     params: &ReportParams,
     dirs: &[PathBuf],
@@ -53,7 +82,8 @@ pub fn write(
     out: &Path,
     session: &Session,
 ) -> Result<Vec<PathBuf>> {
-    let mut report = assemble(rows, params);
+    let mut report = assemble(rows, answers, params);
+    report.notes.extend(same_masks(rows, dirs));
     let failed = failures.iter().map(|f| {
         let reason = f.reason.lines().next().unwrap_or_default();
         format!("{}: failed, no results: {reason}", f.scan)
@@ -90,6 +120,9 @@ fn render(report: &Report, session: &Session) -> Result<Vec<(String, Vec<u8>)>> 
     let text = |name: &str, content: String| (name.to_owned(), content.into_bytes());
     let mut files = vec![
         text("report.md", markdown::render(report)),
+        text(ANSWERS, table::to_csv(&report.answers.lines)),
+        text("groups.csv", table::to_csv(&report.groups.lines)),
+        text("comparisons.csv", table::to_csv(&report.groups.comparisons)),
         text("e_app.csv", table::to_csv(&report.lines)),
         text("results.csv", table::to_csv(&report.rows)),
     ];
@@ -126,22 +159,67 @@ fn pages(rows: &[Row], dirs: &[PathBuf]) -> Vec<ScanPage> {
     pages
 }
 
-fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
+/// The folder of a scan, and what was segmented there.
+fn folder(scan: &str, dirs: &[PathBuf]) -> Option<(PathBuf, SegmentRecord)> {
     let places = dirs.iter().flat_map(|dir| [dir.join(scan), dir.clone()]);
-    let found = places
+    places
         .filter_map(|dir| specimen::record(&dir).map(|record| (dir, record)))
-        .find(|(_, record)| record.scan == scan);
-    let Some((dir, record)) = found else {
+        .find(|(_, record)| record.scan == scan)
+}
+
+/// Scans whose masks are one, voxel by voxel: the same specimen, counted twice.
+fn same_masks(rows: &[Row], dirs: &[PathBuf]) -> Vec<String> {
+    let mut seen: Vec<(String, Vec<String>)> = Vec::new();
+    for page in pages(rows, &[]) {
+        let mask = folder(&page.scan, dirs).map(|(dir, _)| dir.join(specimen::MASK));
+        let Some(hash) = mask.and_then(|mask| scan::hash(&mask).ok()) else {
+            continue;
+        };
+        match seen.iter_mut().find(|(known, _)| *known == hash) {
+            Some((_, scans)) => scans.push(page.scan),
+            None => seen.push((hash, vec![page.scan])),
+        }
+    }
+    let twice = seen.into_iter().filter(|(_, scans)| scans.len() > 1);
+    twice
+        .map(|(_, scans)| {
+            format!(
+                "{} are the same mask voxel by voxel: one specimen that is counted {} times, unless the manifest gives them one subject",
+                scans.join(" and "),
+                scans.len()
+            )
+        })
+        .collect()
+}
+
+fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
+    let Some((dir, record)) = folder(scan, dirs) else {
         return ScanPage {
             scan: scan.to_owned(),
             ..ScanPage::default()
         };
     };
+    let slices = std::fs::read(dir.join(specimen::PICTURE)).ok();
+    let caption = "Mid-slices of the three planes, with the outline of the mask".to_owned();
     ScanPage {
         scan: scan.to_owned(),
-        picture: std::fs::read(dir.join(specimen::PICTURE)).ok(),
+        pictures: slices.into_iter().map(|png| (caption.clone(), png)).collect(),
         facts: facts(&record),
+        stiffness: stiffness::record(&dir.join(RECORD)).map(|record| stiffness_page::shown(&record)),
+        files: files(&dir),
     }
+}
+
+/// Fields, curves and models that were asked for.
+fn files(dir: &Path) -> Vec<String> {
+    let wanted = |name: &str| {
+        name.starts_with("field") || name.ends_with(".inp") || name == "curve.csv" || name == "fracture.csv"
+    };
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| wanted(name)).collect();
+    names.sort();
+    names
 }
 
 fn facts(record: &SegmentRecord) -> Vec<(String, String)> {
@@ -207,6 +285,11 @@ fn facts(record: &SegmentRecord) -> Vec<(String, String)> {
 }
 
 fn threshold(record: &SegmentRecord) -> String {
+    let labels = &record.settings.labels;
+    if !labels.is_empty() {
+        let words: Vec<String> = labels.iter().map(i32::to_string).collect();
+        return format!("labels {}", words.join(", "));
+    }
     let (lower, upper) = (record.results.lower, record.results.upper);
     let unit = record
         .input

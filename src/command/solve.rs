@@ -1,11 +1,12 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
+use crate::command::fields::Fields;
+use crate::command::in_words::in_words;
 use crate::command::lattice::binned;
 use crate::command::segment::load;
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
-use crate::export::{inp, vti, vtk};
-use crate::image::nifti;
+use crate::export::inp;
 use crate::io::atomic;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
@@ -17,10 +18,11 @@ use crate::pipeline::apparent::{Load, Method, SolveParams, lattice, voxel_fe};
 use crate::pipeline::lattice::{Boundary, Case, LatticeParams};
 use crate::record::results::Results;
 use crate::record::specimen;
+use crate::result::cautions;
 use crate::result::extrapolate::{is_extrapolated, voxel_fe_error, with_extrapolated};
 use crate::result::ffb::with_ffb;
 use crate::result::row::{FailureLoad, Marks, Row};
-use crate::result::settings::{BoundaryRule, CellType, Settings};
+use crate::result::settings::{CellType, Settings};
 use crate::solver::cg::CgStep;
 use crate::volume::Specimen;
 use indicatif::ProgressBar;
@@ -43,14 +45,18 @@ pub fn solve(
     if !session.dry_run {
         atomic::sweep(dir);
     }
+    let reading = session.bar(1, "reading the mask");
     let specimen = loaded(dir, params)?;
     let tissue = Tissue::of(&specimen, params)?;
     let settings = tissue.label(params.key(&specimen), params);
     drop(tissue);
+    let height_mm = specimen.length_mm(params.axis);
+    warn_of_unusual(&settings, height_mm, session);
     if params.method == Method::Lattice {
         warn_of_coarse(dir, lattices, session);
     }
     let mean_thickness_mm = plate_thickness_mm(&specimen.bone);
+    reading.finish_and_clear();
     let morphometry = specimen::record(dir).and_then(|record| record.results.morphometry);
     let mut results = Results::open(dir, session.force)?;
     let mut rows = Vec::new();
@@ -64,12 +70,13 @@ pub fn solve(
             },
         };
         let kept = results.find(&blank, params);
-        let mut row = match kept
+        let kept = kept
             .filter(|_| !job.is_stiffness(params) || stiffness::is_there(dir, params))
             // Fields are written over by the next solve: whether those there are these is not known.
-            .filter(|_| params.fields.is_empty())
-        {
-            Some(row) => row,
+            .filter(|_| params.fields.is_empty());
+        let is_kept = kept.is_some();
+        let (mut row, fields) = match kept {
+            Some(row) => (row, Fields::None),
             None if session.dry_run => {
                 estimate::refuse_what_does_not_fit(&specimen, job.case(), params)?;
                 let mib = estimate::of_solve_mib(&specimen, job.case(), params)?;
@@ -86,15 +93,36 @@ pub fn solve(
             }
         };
         mark(&mut row, morphometry.as_ref());
-        session.say(in_words(&row));
+        cautions::mark(&mut row, height_mm);
+        session.result(format!("{}{}", in_words(&row), said_of_kept(is_kept)));
+        // The row first: fields that cannot be written do not cost it.
         results.keep(&blank, params, &row)?;
+        fields.write(dir)?;
         rows.push(row);
     }
     let all = with_extrapolated(&with_ffb(&rows));
     for row in all.iter().filter(|row| is_extrapolated(row)) {
-        session.say(in_words(row));
+        session.result(in_words(row));
     }
     Ok(all)
+}
+
+fn said_of_kept(is_kept: bool) -> &'static str {
+    match is_kept {
+        true => "  [solved before with the same settings: kept]",
+        false => "",
+    }
+}
+
+/// What is unusual of all rows of a solve alike.
+fn warn_of_unusual(settings: &Settings, height_mm: f64, session: &Session) {
+    let row = Row {
+        key: settings.clone(),
+        ..Row::default()
+    };
+    for caution in cautions::cautions(&row, height_mm) {
+        session.warn(caution);
+    }
 }
 
 /// With grey values where the material asks for them.
@@ -206,29 +234,28 @@ fn solve_job(
     blank: &Row,
     params: &SolveParams,
     session: &Session,
-) -> Result<Row> {
+) -> Result<(Row, Fields)> {
     let meter = Meter::start();
     let bar = session.bar(1000, &format!("{} {} mm", job.name(), blank.key.lp_mm));
     if job.is_stiffness(params) {
         let observe = |load: usize, step| show_load(&bar, load, step, params.tolerance);
         let row = stiffness::solve(dir, specimen, params, blank, session, observe)?;
         bar.finish_and_clear();
-        return Ok(metered(row, &meter));
+        return Ok((metered(row, &meter), Fields::None));
     }
     let observe = |step| show(&bar, step, params.tolerance);
-    let (solved, recorded) = match job {
+    let (solved, recorded, sites) = match job {
         Job::Lattice(case) => {
-            let (solved, fields) = lattice::solve_recorded(specimen, case, params, observe)?;
-            if let Some(fields) = fields {
-                let name = case.stem();
-                vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), &name, &fields)?;
-            }
-            (solved, Recorded::default())
+            let (solved, sites) = lattice::solve_recorded(specimen, case, params, observe)?;
+            let named = sites.map(|sites| (case.stem(), sites));
+            (solved, Recorded::default(), named)
         }
-        Job::VoxelFe => voxel_fe::solve_recorded(specimen, params, observe)?,
+        Job::VoxelFe => {
+            let (solved, recorded) = voxel_fe::solve_recorded(specimen, params, observe)?;
+            (solved, recorded, None)
+        }
     };
     bar.finish_and_clear();
-    write_fields(dir, &recorded)?;
     let mut row = solved.row(blank.clone());
     let discretization_error_mpa = voxel_fe_error(&row);
     if let Some(solved) = &mut row.solved {
@@ -238,21 +265,11 @@ fn solve_job(
             factor: f.factor,
         });
     }
-    Ok(metered(row, &meter))
-}
-
-/// `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView.
-fn write_fields(dir: &Path, recorded: &Recorded) -> Result<()> {
-    for field in &recorded.fields {
-        let file = format!("field-{}.nii.gz", field.name.replace('_', "-"));
-        nifti::write(&dir.join(file), &field.values)?;
-    }
-    let arrays: Vec<_> = recorded
-        .fields
-        .iter()
-        .map(|f| (f.name, &f.values))
-        .collect();
-    vti::write(&dir.join("fields.vti"), &arrays)
+    let fields = match sites {
+        Some((stem, sites)) => Fields::OfSites(stem, sites),
+        None => Fields::OfVoxels(recorded),
+    };
+    Ok((metered(row, &meter), fields))
 }
 
 /// Progress is the share of the error's decades already gained.
@@ -271,32 +288,4 @@ fn show_load(bar: &ProgressBar, load: usize, step: CgStep, tolerance: f64) {
         bar.set_position((1000.0 * (load as f64 + gained) / 6.0) as u64);
         bar.set_message(format!("strain {} of 6, error {error:.1e}", load + 1));
     }
-}
-
-pub(super) fn in_words(row: &Row) -> String {
-    let number = |v: Option<f64>, digits: usize| v.map_or("NA".into(), |v| format!("{v:.digits$}"));
-    let solved = row.solved.clone().unwrap_or_default();
-    let note = row
-        .marks
-        .note
-        .as_ref()
-        .map_or(String::new(), |n| format!("  ({n})"));
-    let discretization = solved
-        .discretization_error_mpa
-        .map_or(String::new(), |e| format!(" ± {e:.3} (discretisation)"));
-    let failure = solved.failure.map_or(String::new(), |failure| {
-        format!("  failure load {:.3} N", failure.load_n)
-    });
-    format!(
-        "{} {:<8} {:<12} {:>6} mm  E_app {:>9} MPa ± {:<7}{discretization} {:>9} sites {:>6} iterations {:>7} s{failure}{note}",
-        row.key.scan,
-        row.key.structure.name(),
-        row.key.boundary.map_or("", BoundaryRule::name),
-        row.key.lp_mm,
-        number(solved.e_app_mpa, 3),
-        number(solved.algebraic_error_mpa, 3),
-        solved.sites.unwrap_or(0),
-        solved.iterations.unwrap_or(0),
-        number(solved.wall_s, 2),
-    )
 }

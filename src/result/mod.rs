@@ -1,5 +1,8 @@
 //! What rows of results say: the row itself, means and limits of several rows, statistics of many.
 
+pub mod answer;
+pub mod cautions;
+pub mod condition;
 pub mod extrapolate;
 pub mod ffb;
 pub mod notes;

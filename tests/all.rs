@@ -1,6 +1,7 @@
 //! One test program. Each module is one subject.
 
 mod accuracy;
+mod answers;
 mod apparent;
 mod cli;
 mod cohort;
@@ -23,6 +24,7 @@ mod remodelling;
 mod report;
 mod scenes;
 mod segment;
+mod slips;
 mod stability;
 mod stiffness;
 mod stopped;

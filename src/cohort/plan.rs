@@ -59,8 +59,8 @@ pub(super) fn plan(
         s if s < 5400.0 => format!("{:.0} min", s / 60.0),
         s => format!("{:.1} h", s / 3600.0),
     };
-    let untold = estimates.iter().filter(|e| e.time_s.is_none()).count();
-    let rest = match untold {
+    let unknown = estimates.iter().filter(|e| e.time_s.is_none()).count();
+    let rest = match unknown {
         0 => String::new(),
         n => format!(", and {n} whose time is not known before reading"),
     };

@@ -1,5 +1,6 @@
 //! Owns the fields of a solve on disk.
 
+use crate::draw::{field, map};
 use crate::error::Result;
 use crate::export::{vti, vtk};
 use crate::image::nifti;
@@ -28,10 +29,36 @@ impl Fields {
     }
 }
 
+/// Mid-slices of a field, for the page.
+fn picture_name(field: &str) -> String {
+    format!("field-{}.png", field.replace('_', "-"))
+}
+
+/// The pictures of fields in a scan's folder, each with its caption.
+pub(super) fn pictures(dir: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names
+        .filter(|name| name.starts_with("field-") && name.ends_with(".png"))
+        .collect();
+    names.sort();
+    let picture = |name: &String| {
+        let field = name.trim_start_matches("field-").trim_end_matches(".png");
+        let caption = format!(
+            "Field {field}, mid-slices of the three planes; colours end where 99 % of the elements do"
+        );
+        Some((caption, std::fs::read(dir.join(name)).ok()?))
+    };
+    names.iter().filter_map(picture).collect()
+}
+
 fn write_voxels(dir: &Path, recorded: &Recorded) -> Result<()> {
-    for field in &recorded.fields {
-        let file = format!("field-{}.nii.gz", field.name.replace('_', "-"));
-        nifti::write(&dir.join(file), &field.values)?;
+    for one in &recorded.fields {
+        let file = format!("field-{}.nii.gz", one.name.replace('_', "-"));
+        nifti::write(&dir.join(file), &one.values)?;
+        if let Some(picture) = field::draw(&one.values) {
+            map::write_png(&dir.join(picture_name(one.name)), &picture)?;
+        }
     }
     let arrays: Vec<_> = recorded
         .fields

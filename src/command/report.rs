@@ -1,6 +1,6 @@
 //! Owns `report` on disk: rows of any number of solved scans in; tables, plots and pages out.
 
-use crate::command::answer;
+use crate::command::{answer, fields};
 use crate::command::stiffness::RECORD;
 use crate::command::stiffness_page;
 use crate::error::Result;
@@ -203,7 +203,11 @@ fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
     let caption = "Mid-slices of the three planes, with the outline of the mask".to_owned();
     ScanPage {
         scan: scan.to_owned(),
-        pictures: slices.into_iter().map(|png| (caption.clone(), png)).collect(),
+        pictures: slices
+            .into_iter()
+            .map(|png| (caption.clone(), png))
+            .chain(fields::pictures(&dir))
+            .collect(),
         facts: facts(&record),
         stiffness: stiffness::record(&dir.join(RECORD)).map(|record| stiffness_page::shown(&record)),
         files: files(&dir),

@@ -188,12 +188,21 @@ mod tests {
 
     #[test]
     fn shares_are_numbers_or_percentages() {
-        let recipe = parse("error = \"5%\"\n[solve]\ntolerance = \"0.1%\"\nstrain = \"-1%\"\n").unwrap();
+        let recipe =
+            parse("error = \"5%\"\n[solve]\ntolerance = \"0.1%\"\nstrain = \"-1%\"\n").unwrap();
         assert_eq!(recipe.error, Some(0.05));
-        assert_eq!((recipe.solve.tolerance, recipe.solve.strain), (0.001, -0.01));
+        assert_eq!(
+            (recipe.solve.tolerance, recipe.solve.strain),
+            (0.001, -0.01)
+        );
         assert_eq!(parse("[solve]\nstrain = 1").unwrap().solve.strain, 1.0);
-        let words = parse("[solve]\ntolerance = \"fine\"").unwrap_err().to_string();
-        assert!(words.contains("percentage") && words.contains("line 2"), "{words}");
+        let words = parse("[solve]\ntolerance = \"fine\"")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            words.contains("percentage") && words.contains("line 2"),
+            "{words}"
+        );
     }
 
     #[test]
@@ -202,7 +211,12 @@ mod tests {
             assert!(Recipe::read(Path::new(name)).is_ok(), "{name}");
             assert_eq!(built_in(name).unwrap(), text);
         }
-        assert!(built_in("papre").unwrap_err().to_string().contains("to-an-error"));
+        assert!(
+            built_in("papre")
+                .unwrap_err()
+                .to_string()
+                .contains("to-an-error")
+        );
     }
 
     #[test]

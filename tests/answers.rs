@@ -20,13 +20,23 @@ fn page(out: &Path) -> String {
 fn one_line_a_scan_with_one_plus_minus() {
     let (dir, scans, recipe) = cohort(2);
     let out = dir.path().join("out");
-    let args = ["run", text(&recipe), text(&scans), "-o", text(&out), "--error", "20%"];
+    let args = [
+        "run",
+        text(&recipe),
+        text(&scans),
+        "-o",
+        text(&out),
+        "--error",
+        "20%",
+    ];
     assert!(run(&args).0 <= 1);
     let found = answers(&out);
     let names: Vec<&str> = found.iter().map(|a| a.scan.as_str()).collect();
     assert_eq!(names, ["s1", "s2"]);
     for line in &found {
-        let own = rows(&out).into_iter().filter(|row| row.key.scan == line.scan);
+        let own = rows(&out)
+            .into_iter()
+            .filter(|row| row.key.scan == line.scan);
         let stated = own.filter_map(|row| {
             let [algebraic, discretisation] = row.stated_errors_mpa();
             Some((algebraic.unwrap_or(0.0) + discretisation?) / row.e_app_mpa()?)
@@ -41,8 +51,15 @@ fn one_line_a_scan_with_one_plus_minus() {
         assert!((line.force_n.unwrap() / force - 1.0).abs() < 1e-6);
         assert!((line.stiffness_n_per_mm.unwrap() / (force / 0.009) - 1.0).abs() < 1e-6);
         let kept = answer::read(&out.join(&line.scan)).unwrap();
-        assert_eq!((kept.e_app_mpa, kept.error_mpa, kept.target), (line.e_app_mpa, line.error_mpa, Some(0.2)));
-        assert!(kept.conditions.starts_with("Compression by 1 % along z"), "{}", kept.conditions);
+        assert_eq!(
+            (kept.e_app_mpa, kept.error_mpa, kept.target),
+            (line.e_app_mpa, line.error_mpa, Some(0.2))
+        );
+        assert!(
+            kept.conditions.starts_with("Compression by 1 % along z"),
+            "{}",
+            kept.conditions
+        );
     }
     // The head of the page, before the first table.
     let page = page(&out);
@@ -50,7 +67,12 @@ fn one_line_a_scan_with_one_plus_minus() {
     for said in ["Compression by 1 % along z", "Tissue modulus 1000 MPa"] {
         assert!(head.contains(said), "{said}");
     }
-    assert!(rest.split_once("</table>").unwrap().0.contains("E_app ± error"));
+    assert!(
+        rest.split_once("</table>")
+            .unwrap()
+            .0
+            .contains("E_app ± error")
+    );
 }
 
 #[test]
@@ -70,13 +92,25 @@ fn groups_are_compared_over_subjects() {
     let (code, _, stderr) = run(&args);
     assert_eq!(code, 0, "{stderr}");
     let lines = fs::read_to_string(out.join("report/groups.csv")).unwrap();
-    let control = lines.lines().find(|l| l.starts_with("E_app (MPa),control,")).unwrap();
+    let control = lines
+        .lines()
+        .find(|l| l.starts_with("E_app (MPa),control,"))
+        .unwrap();
     // Three scans of two subjects.
     assert!(control.starts_with("E_app (MPa),control,3,2,"), "{control}");
     let compared = fs::read_to_string(out.join("report/comparisons.csv")).unwrap();
-    assert!(compared.contains("E_app (MPa),control,OA,independent,"), "{compared}");
+    assert!(
+        compared.contains("E_app (MPa),control,OA,independent,"),
+        "{compared}"
+    );
     let page = page(&out);
-    for said in ["Mann–Whitney", "Hedges’ g", "CI widened by stated errors", "Apparent modulus by group", "control (n = 2)"] {
+    for said in [
+        "Mann–Whitney",
+        "Hedges’ g",
+        "CI widened by stated errors",
+        "Apparent modulus by group",
+        "control (n = 2)",
+    ] {
         assert!(page.contains(said), "{said}");
     }
     // Methods, times and validation are behind folds, after what is of bone.
@@ -102,7 +136,10 @@ fn a_second_run_into_a_folder_adds_to_it() {
     one(1, &[]);
     let first = rows(&out);
     let said = one(2, &[]);
-    assert!(said.contains("scans of earlier runs") && said.contains("s1"), "{said}");
+    assert!(
+        said.contains("scans of earlier runs") && said.contains("s1"),
+        "{said}"
+    );
     assert_eq!(rows(&out)[..first.len()], first);
     assert_eq!(answers(&out).len(), 2);
     // Another load of one scan: its earlier rows stay, its answer is of the condition that both scans share.
@@ -118,15 +155,29 @@ fn the_same_specimen_twice_is_said() {
     let (dir, scans, recipe) = cohort(1);
     fs::copy(scans.join("s1.nii.gz"), scans.join("again.nii.gz")).unwrap();
     let out = dir.path().join("out");
-    assert_eq!(run(&["run", text(&recipe), text(&scans), "-o", text(&out)]).0, 0);
-    assert!(page(&out).contains("again and s1 are the same mask voxel by voxel"), "not said");
+    assert_eq!(
+        run(&["run", text(&recipe), text(&scans), "-o", text(&out)]).0,
+        0
+    );
+    assert!(
+        page(&out).contains("again and s1 are the same mask voxel by voxel"),
+        "not said"
+    );
 }
 
 #[test]
 fn what_was_asked_for_is_on_the_page() {
     let (dir, scans, recipe) = cohort(1);
     let (out, scan) = (dir.path().join("out"), scans.join("s1.nii.gz"));
-    let words = ["run", text(&recipe), text(&scan), "-o", text(&out), "--method", "voxel-fe"];
+    let words = [
+        "run",
+        text(&recipe),
+        text(&scan),
+        "-o",
+        text(&out),
+        "--method",
+        "voxel-fe",
+    ];
     let more = ["--failure", "--fields", "sed"];
     let (code, stdout, stderr) = run(&[&words[..], &more[..]].concat());
     assert_eq!(code, 0, "{stderr}");
@@ -134,11 +185,25 @@ fn what_was_asked_for_is_on_the_page() {
     let load = answers(&out)[0].failure_load_n.unwrap();
     assert!(load > 0.0);
     let found = page(&out);
-    for said in ["failure load (N)", "Field sed-mpa, mid-slices", "field-sed-mpa.nii.gz"] {
+    for said in [
+        "failure load (N)",
+        "Field sed-mpa, mid-slices",
+        "field-sed-mpa.nii.gz",
+    ] {
         assert!(found.contains(said), "{said}");
     }
     let stiffness = dir.path().join("stiffness");
-    let words = ["run", text(&recipe), text(&scan), "-o", text(&stiffness), "--method", "voxel-fe", "--load", "stiffness"];
+    let words = [
+        "run",
+        text(&recipe),
+        text(&scan),
+        "-o",
+        text(&stiffness),
+        "--method",
+        "voxel-fe",
+        "--load",
+        "stiffness",
+    ];
     assert_eq!(run(&words).0, 0);
     let found = page(&stiffness);
     for said in ["Apparent stiffness", "E1 (MPa)", "axis 1 (x, y, z)", "ν12"] {

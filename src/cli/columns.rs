@@ -23,7 +23,10 @@ pub fn run(args: &ColumnsArgs, json: bool) -> Result<Outcome> {
         let names: Vec<&str> = FILES.iter().map(|f| f.name).collect();
         return Err(bonepd_ct::error::Error::setting(
             "columns",
-            format!("no file `{}` is described", args.file.as_deref().unwrap_or_default()),
+            format!(
+                "no file `{}` is described",
+                args.file.as_deref().unwrap_or_default()
+            ),
             format!("name one of {}", names.join(", ")),
         ));
     }

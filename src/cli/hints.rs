@@ -9,28 +9,66 @@ const FLAGS: [(&[&str], &str); 12] = [
         "--lower V (bone is V or more), with --upper V for a window, or --otsu",
     ),
     (
-        &["voxel-size", "voxel", "voxelsize", "voxel-mm", "resolution", "spacing-mm"],
+        &[
+            "voxel-size",
+            "voxel",
+            "voxelsize",
+            "voxel-mm",
+            "resolution",
+            "spacing-mm",
+        ],
         "--spacing MM, one number or X,Y,Z in millimetres (0.0195, not 19.5)",
     ),
     (
-        &["e", "young", "youngs-modulus", "young-modulus", "e-mpa", "modulus", "elastic-modulus", "tissue-modulus"],
+        &[
+            "e",
+            "young",
+            "youngs-modulus",
+            "young-modulus",
+            "e-mpa",
+            "modulus",
+            "elastic-modulus",
+            "tissue-modulus",
+        ],
         "--young-mpa E, in MPa (10 GPa is 10000)",
     ),
-    (&["nu", "v", "poissons-ratio", "poisson-ratio"], "--poisson NU"),
     (
-        &["boundary-condition", "boundary-conditions", "bc", "bcs", "support", "supports"],
+        &["nu", "v", "poissons-ratio", "poisson-ratio"],
+        "--poisson NU",
+    ),
+    (
+        &[
+            "boundary-condition",
+            "boundary-conditions",
+            "bc",
+            "bcs",
+            "support",
+            "supports",
+        ],
         "--ends free or bonded for the loaded ends; --load confined holds the sides; --boundary is how a lattice meets the bone's surface",
     ),
     (
         &["lp-mm", "lattice-parameter", "spacing-lattice"],
         "--lp MM, comma-separated",
     ),
-    (&["sigma", "smooth", "smoothing", "gauss", "blur"], "--gaussian VOXELS"),
-    (&["output", "outdir", "out-dir", "output-dir"], "-o FOLDER, or --out FOLDER"),
+    (
+        &["sigma", "smooth", "smoothing", "gauss", "blur"],
+        "--gaussian VOXELS",
+    ),
+    (
+        &["output", "outdir", "out-dir", "output-dir"],
+        "-o FOLDER, or --out FOLDER",
+    ),
     (&["grip", "grips", "cap", "caps"], "--grip-mm MM"),
-    (&["target", "accuracy", "precision", "max-error"], "--error 3%"),
+    (
+        &["target", "accuracy", "precision", "max-error"],
+        "--error 3%",
+    ),
     (&["label", "values"], "--labels VALUES, comma-separated"),
-    (&["fe", "fem", "voxel-fe", "hex8", "solver"], "--method voxel-fe"),
+    (
+        &["fe", "fem", "voxel-fe", "hex8", "solver"],
+        "--method voxel-fe",
+    ),
 ];
 
 /// A line more on how words could not be understood; None where clap says it all.
@@ -62,6 +100,8 @@ fn flag(word: &str) -> Option<String> {
             "results go into the folder of the segmented scan itself: leave -o out".to_owned(),
         );
     }
-    let (_, meant) = FLAGS.iter().find(|(names, _)| names.contains(&bare.as_str()))?;
+    let (_, meant) = FLAGS
+        .iter()
+        .find(|(names, _)| names.contains(&bare.as_str()))?;
     Some(format!("here it is {meant}"))
 }

@@ -42,7 +42,9 @@ pub fn fraction(word: &str) -> Result<f64, String> {
             "`{word}` is {} %: expected a share below 1, as 3% or 0.03",
             100.0 * v
         )),
-        _ => Err(format!("expected a share above 0, as 3% or 0.03, found `{word}`")),
+        _ => Err(format!(
+            "expected a share above 0, as 3% or 0.03, found `{word}`"
+        )),
     }
 }
 

@@ -94,7 +94,8 @@ pub fn cohort(
         bar: session.bar(jobs.len() as u64, "all scans"),
         done: Mutex::new(vec![None; jobs.len()]),
     };
-    run.bar.set_message(format!("0 of {} scans done", jobs.len()));
+    run.bar
+        .set_message(format!("0 of {} scans done", jobs.len()));
     let memory: Vec<f64> = estimates.iter().map(|e| e.memory_mib).collect();
     let limit = resources
         .memory_mib
@@ -329,7 +330,11 @@ fn in_words(rows: &[Row]) -> String {
 /// Whether all that was solved is what an earlier run left.
 fn said_of_kept(rows: &[Row], before: &[Row]) -> &'static str {
     let mut solved = rows.iter().filter(|row| !row.key.is_derived()).peekable();
-    let kept = |row: &Row| before.iter().any(|old| old.key == row.key && old.solved == row.solved);
+    let kept = |row: &Row| {
+        before
+            .iter()
+            .any(|old| old.key == row.key && old.solved == row.solved)
+    };
     match solved.peek().is_some() && solved.all(kept) {
         true => "  [up to date: kept from an earlier run]",
         false => "",

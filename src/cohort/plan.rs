@@ -25,14 +25,15 @@ pub(super) fn plan(
             quiet: true,
             ..session.clone()
         };
-        let known = segment::in_memory(&job.input, Some(&job.name), &job.segment, &quiet)
-            .and_then(|specimen| {
+        let known = segment::in_memory(&job.input, Some(&job.name), &job.segment, &quiet).and_then(
+            |specimen| {
                 let estimate = of_specimen(&specimen, first, recipe)?;
                 Ok(Estimate {
                     voxels: estimate.voxels.or(Some(specimen.bone.grid.n)),
                     ..estimate
                 })
-            });
+            },
+        );
         bar.inc(1);
         let estimate = *known.as_ref().unwrap_or(first);
         results.push(match &known {

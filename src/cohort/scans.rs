@@ -389,12 +389,16 @@ mod tests {
         let figures = dir.path().join("figures");
         std::fs::create_dir(&figures).unwrap();
         for (name, width) in [("1.png", 4), ("2.png", 5)] {
-            image::GrayImage::new(width, 4).save(figures.join(name)).unwrap();
+            image::GrayImage::new(width, 4)
+                .save(figures.join(name))
+                .unwrap();
         }
         let root = dir.path().to_path_buf();
         let found = |root: &PathBuf| find_names(std::slice::from_ref(root), &Selection::default());
         assert_eq!(found(&root).unwrap(), ["a"]);
-        image::GrayImage::new(4, 4).save(figures.join("2.png")).unwrap();
+        image::GrayImage::new(4, 4)
+            .save(figures.join("2.png"))
+            .unwrap();
         assert_eq!(found(&root).unwrap(), ["a", "figures"]);
     }
 

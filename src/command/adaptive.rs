@@ -3,9 +3,9 @@
 //! First three graded lattices (LP from the strut thickness to half of it), then pairs of voxel-FE solves whose elements
 //! differ by a factor of two, beginning at the coarsest pair that can be expected to suffice.
 
+use crate::command::in_words::in_words;
 use crate::command::ladder::{PAIRS, element_mm, suffices, voxel_fe};
 use crate::command::segment::load;
-use crate::command::in_words::in_words;
 use crate::command::solve::solve;
 use crate::error::Result;
 use crate::machine::session::Session;

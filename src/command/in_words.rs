@@ -1,6 +1,6 @@
 //! Owns the line that the terminal shows of a row.
 
-use crate::result::answer::{stated_error_mpa, AnswerLine};
+use crate::result::answer::{AnswerLine, stated_error_mpa};
 use crate::result::cautions::WARNING;
 use crate::result::row::Row;
 use crate::result::settings::BoundaryRule;

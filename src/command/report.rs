@@ -1,8 +1,8 @@
 //! Owns `report` on disk: rows of any number of solved scans in; tables, plots and pages out.
 
-use crate::command::{answer, fields};
 use crate::command::stiffness::RECORD;
 use crate::command::stiffness_page;
+use crate::command::{answer, fields};
 use crate::error::Result;
 use crate::grid::Axis;
 use crate::image::scan;
@@ -55,14 +55,17 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
     // Means of older programs do not say whether they are converged.
     let rows = with_ffb(&rows);
     let answers = answers(&rows, dirs, None);
-    write(&rows, answers, &failures, &params, dirs, recipe, out, session)
+    write(
+        &rows, answers, &failures, &params, dirs, recipe, out, session,
+    )
 }
 
 /// The answers of `rows`, with what the folders of the scans, under `dirs`, say of them. `target` is the relative error asked for;
 /// without it that of each scan's last solve.
 pub fn answers(rows: &[Row], dirs: &[PathBuf], target: Option<f64>) -> Answers {
     answers::answers(rows, |scan| {
-        let facts = folder(scan, dirs).map_or_else(ScanFacts::default, |(dir, _)| answer::facts(&dir));
+        let facts =
+            folder(scan, dirs).map_or_else(ScanFacts::default, |(dir, _)| answer::facts(&dir));
         ScanFacts {
             target: target.or(facts.target),
             ..facts
@@ -209,7 +212,8 @@ fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
             .chain(fields::pictures(&dir))
             .collect(),
         facts: facts(&record),
-        stiffness: stiffness::record(&dir.join(RECORD)).map(|record| stiffness_page::shown(&record)),
+        stiffness: stiffness::record(&dir.join(RECORD))
+            .map(|record| stiffness_page::shown(&record)),
         files: files(&dir),
     }
 }
@@ -217,7 +221,10 @@ fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
 /// Fields, curves and models that were asked for.
 fn files(dir: &Path) -> Vec<String> {
     let wanted = |name: &str| {
-        name.starts_with("field") || name.ends_with(".inp") || name == "curve.csv" || name == "fracture.csv"
+        name.starts_with("field")
+            || name.ends_with(".inp")
+            || name == "curve.csv"
+            || name == "fracture.csv"
     };
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let names = entries.filter_map(|entry| entry.file_name().into_string().ok());

@@ -27,15 +27,23 @@ fn constants(record: &StiffnessRecord) -> Table {
     };
     let triple = |names: [&str; 3], values: [f64; 3]| -> Vec<Vec<Cell>> {
         let lines = names.into_iter().zip(values);
-        lines.map(|(name, value)| vec![text(name), number(Some(value))]).collect()
+        lines
+            .map(|(name, value)| vec![text(name), number(Some(value))])
+            .collect()
     };
     let mut body = triple(["E1 (MPa)", "E2 (MPa)", "E3 (MPa)"], o.young_mpa);
     body.extend(triple(["G23 (MPa)", "G13 (MPa)", "G12 (MPa)"], o.shear_mpa));
     body.extend(triple(["ν23", "ν13", "ν12"], o.poisson));
-    for (name, [x, y, z]) in ["axis 1 (x, y, z)", "axis 2", "axis 3"].into_iter().zip(o.axes) {
+    for (name, [x, y, z]) in ["axis 1 (x, y, z)", "axis 2", "axis 3"]
+        .into_iter()
+        .zip(o.axes)
+    {
         body.push(vec![text(name), text(&format!("{x:.3}, {y:.3}, {z:.3}"))]);
     }
     let share = format!("{:.1} %", 100.0 * o.residual);
-    body.push(vec![text("part of the tensor that is not orthotropic"), text(&share)]);
+    body.push(vec![
+        text("part of the tensor that is not orthotropic"),
+        text(&share),
+    ]);
     Table::new(&["orthotropic constant", "value"], body)
 }

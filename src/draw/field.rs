@@ -28,7 +28,10 @@ pub fn draw(values: &Volume<f32>) -> Option<RgbImage> {
     let per_mm = SIDE / size.iter().copied().fold(0.0, f64::max);
     let pixels = |axis: usize| ((size[axis] * per_mm).round() as u32).max(1);
     let height = PLANES.map(|[_, down, _]| pixels(down)).into_iter().max()?;
-    let width: u32 = PLANES.map(|[right, ..]| pixels(right) + MARGIN).iter().sum();
+    let width: u32 = PLANES
+        .map(|[right, ..]| pixels(right) + MARGIN)
+        .iter()
+        .sum();
     let mut picture = RgbImage::from_pixel(
         width + MARGIN + BAR,
         height.max(160) + CAPTION + 2 * MARGIN,
@@ -39,7 +42,13 @@ pub fn draw(values: &Volume<f32>) -> Option<RgbImage> {
         let panel = [pixels(right), pixels(down)];
         slice(&mut picture, left, panel, values, plane, range);
         let names = ["x", "y", "z"];
-        let text = format!("{}{} {}={}", names[right], names[down], names[through], values.grid.n[through] / 2);
+        let text = format!(
+            "{}{} {}={}",
+            names[right],
+            names[down],
+            names[through],
+            values.grid.n[through] / 2
+        );
         write_text(&mut picture, [left, MARGIN + height.max(160) + 8], &text);
         left += panel[0] + MARGIN;
     }
@@ -65,7 +74,11 @@ fn slice(
             let below = (y as usize * n[down]) / height as usize;
             at[down] = if down == 2 { n[2] - 1 - below } else { below };
             let value = f64::from(all[at[0] + n[0] * (at[1] + n[1] * at[2])]);
-            let colour = if value == 0.0 { PORE } else { range.colour(value) };
+            let colour = if value == 0.0 {
+                PORE
+            } else {
+                range.colour(value)
+            };
             picture.put_pixel(left + x, MARGIN + y, colour);
         }
     }
@@ -75,7 +88,10 @@ fn slice(
 fn range(values: &Volume<f32>) -> Option<Range> {
     let step = (values.grid.len() / 400_000).max(1);
     let sample = values.as_slice().iter().step_by(step);
-    let mut found: Vec<f32> = sample.copied().filter(|v| *v != 0.0 && v.is_finite()).collect();
+    let mut found: Vec<f32> = sample
+        .copied()
+        .filter(|v| *v != 0.0 && v.is_finite())
+        .collect();
     let signed = found.iter().any(|v| *v < 0.0);
     found.iter_mut().for_each(|v| *v = v.abs());
     found.sort_unstable_by(f32::total_cmp);

@@ -15,7 +15,16 @@ const OUTLINE: Rgb<u8> = Rgb([213, 94, 0]);
 
 /// Steps to the pixels that make a bone pixel one of the outline: two wide, so that a page that shows the picture smaller
 /// still shows it.
-const NEAR: [(i32, i32); 8] = [(1, 0), (-1, 0), (0, 1), (0, -1), (2, 0), (-2, 0), (0, 2), (0, -2)];
+const NEAR: [(i32, i32); 8] = [
+    (1, 0),
+    (-1, 0),
+    (0, 1),
+    (0, -1),
+    (2, 0),
+    (-2, 0),
+    (0, 2),
+    (0, -2),
+];
 const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
 const INK: Rgb<u8> = Rgb([30, 30, 30]);
 
@@ -123,11 +132,10 @@ fn draw_plane(
     let is_bone = |x: u32, y: u32| bone.as_slice()[voxel(x, y)] != 0;
     for y in 0..height {
         for x in 0..width {
-            let edge = is_bone(x, y)
-                && NEAR.iter().any(|&(dx, dy)| {
-                    let (x, y) = (x.checked_add_signed(dx), y.checked_add_signed(dy));
-                    matches!((x, y), (Some(x), Some(y)) if x < width && y < height && !is_bone(x, y))
-                });
+            let edge = is_bone(x, y) && NEAR.iter().any(|&(dx, dy)| {
+                let (x, y) = (x.checked_add_signed(dx), y.checked_add_signed(dy));
+                matches!((x, y), (Some(x), Some(y)) if x < width && y < height && !is_bone(x, y))
+            });
             let shade = ((grey.as_slice()[voxel(x, y)] - dark) / (light - dark) * 255.0) as u8;
             let colour = if edge { OUTLINE } else { Rgb([shade; 3]) };
             picture.put_pixel(left + x, top + y, colour);

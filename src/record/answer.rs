@@ -33,9 +33,16 @@ pub struct Answer {
 
 /// The answer of the rows of one command; None where none has a modulus.
 pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
-    let solved: Vec<&Row> = rows.iter().filter(|row| row.e_app_mpa().is_some()).collect();
+    let solved: Vec<&Row> = rows
+        .iter()
+        .filter(|row| row.e_app_mpa().is_some())
+        .collect();
     let condition = shared(&solved)?;
-    let own = || solved.iter().filter(|row| Condition::of(&row.key) == condition);
+    let own = || {
+        solved
+            .iter()
+            .filter(|row| Condition::of(&row.key) == condition)
+    };
     let AnswerLine {
         scan,
         e_app_mpa,
@@ -48,7 +55,9 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         force_n,
         ..
     } = line(best(own().copied())?, facts);
-    let wall_s = own().filter(|row| !row.key.is_derived()).filter_map(|row| row.wall_s());
+    let wall_s = own()
+        .filter(|row| !row.key.is_derived())
+        .filter_map(|row| row.wall_s());
     Some(Answer {
         scan,
         e_app_mpa,
@@ -57,7 +66,11 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         met,
         method,
         element_mm,
-        conditions: format!("{} {}", condition.load_in_words(), condition.tissue_in_words()),
+        conditions: format!(
+            "{} {}",
+            condition.load_in_words(),
+            condition.tissue_in_words()
+        ),
         threshold_sensitivity,
         stiffness_n_per_mm,
         force_n,

@@ -57,7 +57,13 @@ fn by_group(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
         GroupOfPoints {
             label: format!("{group} (n = {n})"),
             hue,
-            mean: summary(&values).map(|s| [s.mean, s.mean_low.unwrap_or(s.mean), s.mean_high.unwrap_or(s.mean)]),
+            mean: summary(&values).map(|s| {
+                [
+                    s.mean,
+                    s.mean_low.unwrap_or(s.mean),
+                    s.mean_high.unwrap_or(s.mean),
+                ]
+            }),
             median: summary(&values).map(|s| s.median),
             values,
         }
@@ -93,7 +99,8 @@ fn against_bv_tv(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
             points,
         };
         if let Some(fit) = regression(&x, &y) {
-            let [low, high] = [f64::min, f64::max].map(|f| x.iter().copied().reduce(f).unwrap_or(0.0));
+            let [low, high] =
+                [f64::min, f64::max].map(|f| x.iter().copied().reduce(f).unwrap_or(0.0));
             let at = |x: f64| Point::new(x, fit.intercept + fit.slope * x);
             curves.push(Curve {
                 name: String::new(),
@@ -131,7 +138,11 @@ fn scan_by_scan(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
         return None;
     }
     let groups = groups(kept);
-    let place = |scan: &str| kept.iter().position(|a| a.scan == scan).map(|i| i as f64 + 1.0);
+    let place = |scan: &str| {
+        kept.iter()
+            .position(|a| a.scan == scan)
+            .map(|i| i as f64 + 1.0)
+    };
     let curves = groups.iter().enumerate().map(|(hue, group)| Curve {
         name: match groups.len() {
             1 => String::new(),
@@ -179,7 +190,10 @@ mod tests {
     }
 
     fn stems(groups: &[Option<&str>]) -> Vec<String> {
-        figures(&answers(groups)).into_iter().map(|f| f.stem).collect()
+        figures(&answers(groups))
+            .into_iter()
+            .map(|f| f.stem)
+            .collect()
     }
 
     #[test]
@@ -192,7 +206,10 @@ mod tests {
         let Content::Curves(curves) = &figure.content else {
             panic!("curves are curves");
         };
-        let looks: Vec<_> = curves.iter().map(|c| (c.name.as_str(), c.hue, c.shape)).collect();
+        let looks: Vec<_> = curves
+            .iter()
+            .map(|c| (c.name.as_str(), c.hue, c.shape))
+            .collect();
         assert_eq!(looks, [("a", 0, 0), ("b", 1, 1)]);
         assert_eq!(curves[0].points[0].y_error, Some([1.0, 1.0]));
     }
@@ -205,6 +222,9 @@ mod tests {
             panic!("curves are curves");
         };
         let rules: Vec<_> = curves.iter().filter(|c| c.mark == Mark::Rule).collect();
-        assert_eq!((rules.len(), rules[0].hue, rules[0].points[1].x), (1, 0, 0.1 * 3.0));
+        assert_eq!(
+            (rules.len(), rules[0].hue, rules[0].points[1].x),
+            (1, 0, 0.1 * 3.0)
+        );
     }
 }

@@ -215,24 +215,45 @@ mod tests {
 
     #[test]
     fn a_scan_of_other_conditions_is_named_and_not_compared() {
-        let rows = [row("a", 0.0, 10.0), row("b", 0.0, 20.0), row("c", 0.6, 90.0), row("d", 0.0, 0.0)];
+        let rows = [
+            row("a", 0.0, 10.0),
+            row("b", 0.0, 20.0),
+            row("c", 0.6, 90.0),
+            row("d", 0.0, 0.0),
+        ];
         let found = answers(&rows, |_| ScanFacts::default());
         assert_eq!(found.lines.len(), 4);
         assert_eq!(found.apart, ["c"]);
-        assert!(found.left_out[0].contains("grips of 0.6 mm"), "{:?}", found.left_out);
+        assert!(
+            found.left_out[0].contains("grips of 0.6 mm"),
+            "{:?}",
+            found.left_out
+        );
         let (kept, notes) = comparable(&found);
         let names: Vec<&str> = kept.iter().map(|a| a.scan.as_str()).collect();
         assert_eq!(names, ["a", "b"]);
         assert!(notes[0].starts_with("d carries no load"));
-        assert!(found.conditions[1].contains("1000 MPa"), "{:?}", found.conditions);
-        assert!(found.conditions[2].starts_with("FFB mean"), "{:?}", found.conditions);
+        assert!(
+            found.conditions[1].contains("1000 MPa"),
+            "{:?}",
+            found.conditions
+        );
+        assert!(
+            found.conditions[2].starts_with("FFB mean"),
+            "{:?}",
+            found.conditions
+        );
     }
 
     #[test]
     fn the_table_has_one_plus_minus() {
         let found = answers(&[row("a", 0.0, 10.0)], |_| ScanFacts::default());
         let table = table(&found);
-        let at = table.head.iter().position(|h| h.starts_with("E_app")).unwrap();
+        let at = table
+            .head
+            .iter()
+            .position(|h| h.starts_with("E_app"))
+            .unwrap();
         assert_eq!(table.body[0][at].text, "10.0 ± 5.0");
         assert!(!table.head.iter().any(|h| h == "failure load (N)"));
     }

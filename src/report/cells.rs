@@ -145,10 +145,7 @@ pub fn p_value(p: Option<f64>) -> Cell {
         Some(p) if p < 0.01 => format!("{p:.4}"),
         Some(p) => format!("{p:.3}"),
     };
-    Cell {
-        text,
-        ..number(p)
-    }
+    Cell { text, ..number(p) }
 }
 
 /// `value ± error`, the error in two digits and the value to the same place; the value alone where no error is stated.

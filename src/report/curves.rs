@@ -3,10 +3,10 @@
 use super::figure::{Axis, Content, Curve, Figure, Mark, Point};
 use super::table::{condition, varying_settings};
 use super::{Model, distinct};
-use crate::result::row::Row;
-use crate::result::settings::CellType;
 use crate::result::answer::stated_error_mpa;
 use crate::result::condition::Condition;
+use crate::result::row::Row;
+use crate::result::settings::CellType;
 
 /// Curves of one colour and marker: one structure, one model, one set of settings.
 #[derive(Debug, Clone, PartialEq)]
@@ -135,7 +135,11 @@ fn convergence_of(scan: &str, solved: &[Solved]) -> Figure {
 
 /// The tissue in a sentence, where all rows have one.
 fn tissue(found: &[Solved]) -> String {
-    let all = distinct(found.iter().map(|s| Condition::of(&s.row.key).tissue_in_words()));
+    let all = distinct(
+        found
+            .iter()
+            .map(|s| Condition::of(&s.row.key).tissue_in_words()),
+    );
     match &all[..] {
         [one] => format!(" {one}"),
         _ => String::new(),
@@ -157,7 +161,10 @@ pub fn wall_time(rows: &[Row]) -> Option<Figure> {
     let place = |s: &Solved| {
         let own = s.row.solved.as_ref().filter(|_| !s.row.key.is_derived())?;
         let unknowns = own.unknowns.filter(|n| *n > 0)?;
-        Some(Point::new(unknowns as f64, own.wall_s.filter(|t| *t > 0.0)?))
+        Some(Point::new(
+            unknowns as f64,
+            own.wall_s.filter(|t| *t > 0.0)?,
+        ))
     };
     let curves = curves(&solved, Mark::Points, |members| {
         members.iter().filter_map(|s| place(s)).collect()

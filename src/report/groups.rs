@@ -131,7 +131,10 @@ pub fn groups(answers: &[&AnswerLine]) -> Groups {
 fn of_quantity<'a>(answers: &[&'a AnswerLine], quantity: &Quantity) -> Vec<Group<'a>> {
     let named = distinct(answers.iter().filter_map(|a| a.group.as_deref()));
     let of = |name: &'a str, own: Vec<&AnswerLine>| {
-        let own: Vec<&AnswerLine> = own.into_iter().filter(|a| (quantity.value)(a).is_some()).collect();
+        let own: Vec<&AnswerLine> = own
+            .into_iter()
+            .filter(|a| (quantity.value)(a).is_some())
+            .collect();
         let subjects = distinct(own.iter().map(|a| subject(a)));
         let members = subjects.into_iter().map(|subject_name| {
             let values: Vec<f64> = own
@@ -194,7 +197,11 @@ fn compared(quantity: &Quantity, groups: &[Group]) -> Vec<ComparisonLine> {
 
 /// None where groups share some subjects but not all, or are too small.
 fn comparison(quantity: &Quantity, a: &Group, b: &Group) -> Option<ComparisonLine> {
-    let shared = a.members.iter().filter(|m| b.of(&m.subject).is_some()).count();
+    let shared = a
+        .members
+        .iter()
+        .filter(|m| b.of(&m.subject).is_some())
+        .count();
     let (va, vb) = (a.values(), b.values());
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     let base = ComparisonLine {
@@ -240,7 +247,10 @@ fn independent(base: ComparisonLine, a: &[f64], b: &[f64]) -> Option<ComparisonL
 
 /// Each subject against itself.
 fn paired(base: ComparisonLine, a: &Group, b: &Group) -> Option<ComparisonLine> {
-    let pairs = a.members.iter().filter_map(|m| Some((m.value, b.of(&m.subject)?)));
+    let pairs = a
+        .members
+        .iter()
+        .filter_map(|m| Some((m.value, b.of(&m.subject)?)));
     let (va, vb): (Vec<f64>, Vec<f64>) = pairs.unzip();
     let found = agreement(&va, &vb)?;
     let differences: Vec<f64> = va.iter().zip(&vb).map(|(x, y)| x - y).collect();
@@ -298,7 +308,14 @@ fn notes(answers: &[&AnswerLine]) -> Vec<String> {
 /// Description, as the page shows it.
 pub fn lines_table(groups: &Groups) -> Table {
     let head = [
-        "quantity", "group", "subjects", "scans", "mean", "SD", "95 % CI of the mean", "median",
+        "quantity",
+        "group",
+        "subjects",
+        "scans",
+        "mean",
+        "SD",
+        "95 % CI of the mean",
+        "median",
         "mean stated error",
     ];
     let body = groups.lines.iter().map(|line| {
@@ -383,7 +400,10 @@ mod tests {
     fn two_groups() -> Vec<AnswerLine> {
         let values = [("c", [40.0, 44.0, 52.0]), ("o", [20.0, 23.0, 31.0])];
         let scans = values.iter().flat_map(|(group, values)| {
-            values.iter().enumerate().map(move |(i, e)| answer(&format!("{group}{i}"), None, group, *e))
+            values
+                .iter()
+                .enumerate()
+                .map(move |(i, e)| answer(&format!("{group}{i}"), None, group, *e))
         });
         scans.collect()
     }
@@ -392,7 +412,10 @@ mod tests {
     fn two_groups_have_one_comparison_a_quantity() {
         let found = of(&two_groups());
         let c = &found.comparisons[0];
-        assert_eq!((c.quantity.as_str(), c.group.as_str(), c.other.as_str()), ("E_app (MPa)", "c", "o"));
+        assert_eq!(
+            (c.quantity.as_str(), c.group.as_str(), c.other.as_str()),
+            ("E_app (MPa)", "c", "o")
+        );
         let expected = welch(&[40.0, 44.0, 52.0], &[20.0, 23.0, 31.0]).unwrap();
         assert_eq!((c.difference, c.p_t), (expected.difference, expected.p));
         assert_eq!(c.p_mann_whitney, Some(0.1));
@@ -436,7 +459,11 @@ mod tests {
         let mut scans = two_groups();
         scans.extend([60.0, 70.0, 90.0].map(|e| answer(&format!("x{e}"), None, "x", e)));
         let found = of(&scans);
-        let of_e: Vec<&ComparisonLine> = found.comparisons.iter().filter(|c| c.quantity.starts_with("E_app")).collect();
+        let of_e: Vec<&ComparisonLine> = found
+            .comparisons
+            .iter()
+            .filter(|c| c.quantity.starts_with("E_app"))
+            .collect();
         assert_eq!(of_e.len(), 3);
         assert!(of_e.iter().all(|c| c.p_t_holm.unwrap() >= c.p_t));
         assert!(of_e.iter().any(|c| c.p_t_holm.unwrap() > c.p_t));
@@ -449,7 +476,10 @@ mod tests {
         assert!(of(&scans).notes[0].contains("`c` and `C`"));
         scans.iter_mut().for_each(|scan| scan.group = None);
         let found = of(&scans);
-        assert_eq!((found.lines[0].group.as_str(), found.lines[0].found.n), ("all", 6));
+        assert_eq!(
+            (found.lines[0].group.as_str(), found.lines[0].found.n),
+            ("all", 6)
+        );
         assert!(found.comparisons.is_empty());
     }
 }

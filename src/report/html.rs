@@ -1,9 +1,9 @@
 //! Owns the report as one HTML file that needs nothing else: styles, figures, pictures and the sorting of tables inside.
 
 use crate::error::{Error, Result};
-use crate::report::figure::Figure;
 use crate::report::answers;
 use crate::report::cells::{Cell, Table, length, link, number, records, text, with_error};
+use crate::report::figure::Figure;
 use crate::report::groups;
 use crate::report::plot;
 use crate::report::{Model, Report};
@@ -73,7 +73,8 @@ pub fn render(report: &Report, pages: &[ScanPage], source: &Source) -> Result<St
     let (own, shared): (Vec<&Figure>, Vec<&Figure>) =
         report.figures.iter().partition(|f| f.scan.is_some());
     let pages: Vec<Page> = pages.iter().map(|page| shown_page(page, &own)).collect();
-    let (folded, figures): (Vec<&Figure>, Vec<&Figure>) = shared.into_iter().partition(|f| f.folded);
+    let (folded, figures): (Vec<&Figure>, Vec<&Figure>) =
+        shared.into_iter().partition(|f| f.folded);
     let shown_all = |figures: Vec<&Figure>| -> Vec<Value> {
         figures.into_iter().map(|f| plain(&shown(f))).collect()
     };
@@ -153,10 +154,19 @@ fn validation() -> Table {
     let page = include_str!("../../reports/validation.md");
     let cells = |line: &str| -> Option<Vec<String>> {
         let inner = line.trim().strip_prefix("| ")?.strip_suffix(" |")?;
-        Some(inner.split(" | ").map(|cell| cell.replace('`', "")).collect())
+        Some(
+            inner
+                .split(" | ")
+                .map(|cell| cell.replace('`', ""))
+                .collect(),
+        )
     };
     // The first table of the file: head, rule, and the lines up to the one that is none of a table.
-    let mut rows = page.lines().map(cells).skip_while(Option::is_none).map_while(|row| row);
+    let mut rows = page
+        .lines()
+        .map(cells)
+        .skip_while(Option::is_none)
+        .map_while(|row| row);
     let head = rows.next().unwrap_or_default();
     let body = rows
         .skip(1)
@@ -186,7 +196,10 @@ pub(super) fn solves(report: &Report) -> Table {
         .filter(|m| report.lines.iter().any(|line| line.modulus(*m).is_some()))
         .collect();
     let mut head = ["scan", "structure", "LP (mm)", "condition", "BV/TV"].to_vec();
-    let names: Vec<String> = models.iter().map(|m| format!("{} (MPa)", m.name())).collect();
+    let names: Vec<String> = models
+        .iter()
+        .map(|m| format!("{} (MPa)", m.name()))
+        .collect();
     head.extend(names.iter().map(String::as_str));
     head.push("time (s)");
     let body = report.lines.iter().map(|line| {
@@ -219,7 +232,12 @@ mod tests {
         assert_eq!(table.head[0], "what");
         assert!(table.body.len() > 8, "{} lines", table.body.len());
         // Not the head of the table after it.
-        assert!(table.body.iter().all(|row| row.len() == 4 && row[0].text != "LP (mm)"));
+        assert!(
+            table
+                .body
+                .iter()
+                .all(|row| row.len() == 4 && row[0].text != "LP (mm)")
+        );
     }
 
     #[test]

@@ -6,9 +6,8 @@ use crate::report::{Report, answers, groups, html};
 
 /// The report's text, with the tables of the page. Figures are `STEM.svg` beside it.
 pub fn render(report: &Report) -> String {
-    let list = |lines: &[String]| -> String {
-        lines.iter().map(|line| format!("- {line}\n")).collect()
-    };
+    let list =
+        |lines: &[String]| -> String { lines.iter().map(|line| format!("- {line}\n")).collect() };
     let mut text = format!("# {}\n\n## Answers\n\n", report.title);
     text += &list(&report.answers.conditions);
     text += &format!("\n{}", answers::table(&report.answers).markdown());
@@ -16,7 +15,10 @@ pub fn render(report: &Report) -> String {
         text += &format!("\n## Notes\n\n{}", list(&report.notes));
     }
     if !report.groups.lines.is_empty() {
-        text += &format!("\n## Groups\n\n{}", groups::lines_table(&report.groups).markdown());
+        text += &format!(
+            "\n## Groups\n\n{}",
+            groups::lines_table(&report.groups).markdown()
+        );
     }
     if !report.groups.comparisons.is_empty() {
         let table = groups::comparisons_table(&report.groups);

@@ -325,7 +325,10 @@ mod tests {
             .filter(|note| note.contains("far from converged"))
             .collect();
         assert_eq!(found.len(), 1, "{found:?}");
-        assert!(found[0].starts_with("2 of 2 scans (a, b): the lattice parameter"), "{found:?}");
+        assert!(
+            found[0].starts_with("2 of 2 scans (a, b): the lattice parameter"),
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -343,10 +346,7 @@ mod tests {
         };
         let coarse = row("a", BoundaryRule::FLOPPY, 0.1, 30.0);
         assert_eq!(stems(&[]), Vec::<String>::new());
-        assert_eq!(
-            stems(std::slice::from_ref(&coarse)),
-            ["convergence-a"]
-        );
+        assert_eq!(stems(std::slice::from_ref(&coarse)), ["convergence-a"]);
         assert_eq!(
             stems(&[
                 coarse.clone(),

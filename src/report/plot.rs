@@ -101,12 +101,15 @@ fn scale_dashes(element: &mut Primitive) {
         _ => return,
     };
     let scale = f64::from(PNG_SCALE);
-    let scaled = dashes.split([' ', ',']).enumerate().filter_map(|(i, word)| {
-        let length: f64 = word.parse().ok()?;
-        // A round end on both sides of each dash takes from the gap after it.
-        let ends = if i % 2 == 0 { -width } else { width };
-        Some(format!("{:.1}", scale * (length + ends).max(0.5)))
-    });
+    let scaled = dashes
+        .split([' ', ','])
+        .enumerate()
+        .filter_map(|(i, word)| {
+            let length: f64 = word.parse().ok()?;
+            // A round end on both sides of each dash takes from the gap after it.
+            let ends = if i % 2 == 0 { -width } else { width };
+            Some(format!("{:.1}", scale * (length + ends).max(0.5)))
+        });
     *dashes = scaled.collect::<Vec<_>>().join(" ");
 }
 
@@ -175,7 +178,9 @@ fn y_range(figure: &Figure) -> Option<[f64; 2]> {
             }
         }
     }
-    let (low, high) = all.iter().fold((0f64, 0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) = all
+        .iter()
+        .fold((0f64, 0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     let usable = !figure.y.log && high > low && (high - low).is_finite();
     usable.then(|| {
         let above = if high > 0.0 { 0.06 * (high - low) } else { 0.0 };
@@ -188,7 +193,10 @@ fn y_range(figure: &Figure) -> Option<[f64; 2]> {
 fn nice([low, high]: [f64; 2]) -> [f64; 2] {
     let power = 10f64.powf(((high - low) / 5.0).log10().floor());
     let steps = [1.0, 2.0, 2.5, 5.0, 10.0].map(|m| m * power);
-    let step = steps.into_iter().find(|s| (high - low) / s <= 6.0).unwrap_or(power);
+    let step = steps
+        .into_iter()
+        .find(|s| (high - low) / s <= 6.0)
+        .unwrap_or(power);
     [(low / step).floor() * step, (high / step).ceil() * step]
 }
 
@@ -312,7 +320,12 @@ mod tests {
     fn dashes_of_pixels_are_as_long_as_those_of_vectors() {
         let dashes = |scene: &Scene| -> Vec<f64> {
             let found = scene.elements.iter().find_map(|e| match e {
-                Primitive::PolyLine { stroke_dasharray, .. } | Primitive::Line { stroke_dasharray, .. } => stroke_dasharray.clone(),
+                Primitive::PolyLine {
+                    stroke_dasharray, ..
+                }
+                | Primitive::Line {
+                    stroke_dasharray, ..
+                } => stroke_dasharray.clone(),
                 Primitive::Path(p) => p.stroke_dasharray.clone(),
                 _ => None,
             });
@@ -322,7 +335,10 @@ mod tests {
         let drawing = draw(&rule(1));
         let (svg, png) = (dashes(&drawing.scene), dashes(&drawing.in_pixels));
         let sum = |d: &[f64]| d.iter().sum::<f64>();
-        assert!((sum(&png) / sum(&svg) - f64::from(PNG_SCALE)).abs() < 0.05, "{svg:?} {png:?}");
+        assert!(
+            (sum(&png) / sum(&svg) - f64::from(PNG_SCALE)).abs() < 0.05,
+            "{svg:?} {png:?}"
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Owns the report's statistics over scans: which methods are held against which, and the tables of it.
 
-use super::sample::{LEAST_SCANS, Sample};
 use super::cells::p_value;
+use super::sample::{LEAST_SCANS, Sample};
 use super::{Model, distinct};
 use crate::result::statistics::agreement::{Agreement, agreement};
 use crate::result::statistics::anova::{Anova, repeated_measures};

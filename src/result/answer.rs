@@ -140,7 +140,9 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         e_app_mpa: row.e_app_mpa(),
         error_mpa: error,
         error_percent: relative.map(|e| 100.0 * e),
-        met: facts.target.map(|target| relative.is_some_and(|e| e <= target)),
+        met: facts
+            .target
+            .map(|target| relative.is_some_and(|e| e <= target)),
         method: method_name(row),
         element_mm: key.lp_mm,
         young_mpa: key.young_mpa,
@@ -151,7 +153,11 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         grip_mm: key.grip_mm,
         stiffness_n_per_mm: forces.map(|[_, k]| k),
         force_n: forces.map(|[f, _]| f),
-        failure_load_n: row.solved.as_ref().and_then(|s| s.failure).map(|f| f.load_n),
+        failure_load_n: row
+            .solved
+            .as_ref()
+            .and_then(|s| s.failure)
+            .map(|f| f.load_n),
         yield_stress_mpa: None,
         threshold_sensitivity: facts.threshold_sensitivity,
         note,
@@ -173,10 +179,14 @@ pub fn answers(
     }
     let answer = |scan: &str| {
         let of_scan = || rows.iter().filter(move |row| row.key.scan == scan);
-        let has = |c: &Condition| of_scan().any(|r| Condition::of(&r.key) == *c && r.e_app_mpa().is_some());
+        let has = |c: &Condition| {
+            of_scan().any(|r| Condition::of(&r.key) == *c && r.e_app_mpa().is_some())
+        };
         let last = of_scan().last().map(|row| Condition::of(&row.key))?;
         let used = if has(condition) { condition } else { &last };
-        let own: Vec<&Row> = of_scan().filter(|r| Condition::of(&r.key) == *used).collect();
+        let own: Vec<&Row> = of_scan()
+            .filter(|r| Condition::of(&r.key) == *used)
+            .collect();
         let mut answer = line(best(own.iter().copied())?, &facts(scan));
         let failure = own.iter().filter_map(|r| r.solved.as_ref()?.failure);
         answer.failure_load_n = answer.failure_load_n.or(failure.last().map(|f| f.load_n));
@@ -236,14 +246,23 @@ mod tests {
             limit,
         ];
         let a = answer_of(&rows);
-        assert_eq!((a.e_app_mpa, a.error_mpa, a.met), (Some(50.0), Some(2.0), Some(true)));
-        assert_eq!((a.method.as_str(), a.error_percent), ("graded-extrapolated", Some(4.0)));
+        assert_eq!(
+            (a.e_app_mpa, a.error_mpa, a.met),
+            (Some(50.0), Some(2.0), Some(true))
+        );
+        assert_eq!(
+            (a.method.as_str(), a.error_percent),
+            ("graded-extrapolated", Some(4.0))
+        );
         // 4 mm², 1 %, 2 mm.
         assert_eq!((a.force_n, a.stiffness_n_per_mm), (Some(2.0), Some(100.0)));
         assert_eq!(answer_of(&rows[..3]).method, "voxel-fe");
         // No error is stated: none is said.
         let a = answer_of(&rows[..1]);
-        assert_eq!((a.e_app_mpa, a.error_mpa, a.met), (Some(20.0), None, Some(false)));
+        assert_eq!(
+            (a.e_app_mpa, a.error_mpa, a.met),
+            (Some(20.0), None, Some(false))
+        );
     }
 
     #[test]
@@ -252,7 +271,10 @@ mod tests {
         let graded = row("a", Some(BoundaryRule::GRADED), 3.0, None);
         assert_eq!(answer_of(&[broken.clone(), graded]).method, "graded");
         let alone = answer_of(&[broken]);
-        assert_eq!((alone.e_app_mpa, alone.error_mpa, alone.met), (Some(0.0), Some(0.0), Some(true)));
+        assert_eq!(
+            (alone.e_app_mpa, alone.error_mpa, alone.met),
+            (Some(0.0), Some(0.0), Some(true))
+        );
     }
 
     #[test]
@@ -268,7 +290,9 @@ mod tests {
         let mut other = row("b", None, 9.0, Some(0.1));
         other.key.grip_mm = 0.6;
         let rows = [row("a", None, 5.0, Some(0.1)), other];
-        let found = answers(&rows, &Condition::of(&rows[0].key), |_| ScanFacts::default());
+        let found = answers(&rows, &Condition::of(&rows[0].key), |_| {
+            ScanFacts::default()
+        });
         let grips: Vec<f64> = found.iter().map(|a| a.grip_mm).collect();
         assert_eq!(grips, [0.0, 0.6]);
     }

@@ -119,6 +119,9 @@ mod tests {
         let once = row.marks.note.clone();
         mark(&mut row, 2.0);
         assert_eq!(row.marks.note, once);
-        assert!(once.unwrap().starts_with("warning: grips of 0.6 mm hold 60 %"));
+        assert!(
+            once.unwrap()
+                .starts_with("warning: grips of 0.6 mm hold 60 %")
+        );
     }
 }

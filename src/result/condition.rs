@@ -109,11 +109,26 @@ impl Condition {
                 words.push(text);
             }
         };
-        say(self.load != other.load, format!("load {}", self.load.name()));
-        say(self.supports != other.supports, format!("ends {}", self.supports.name()));
-        say(self.axis != other.axis, format!("axis {}", self.axis.name()));
-        say(self.strain != other.strain, format!("strain {}", self.strain));
-        say(self.grip_mm != other.grip_mm, format!("grips of {} mm", self.grip_mm));
+        say(
+            self.load != other.load,
+            format!("load {}", self.load.name()),
+        );
+        say(
+            self.supports != other.supports,
+            format!("ends {}", self.supports.name()),
+        );
+        say(
+            self.axis != other.axis,
+            format!("axis {}", self.axis.name()),
+        );
+        say(
+            self.strain != other.strain,
+            format!("strain {}", self.strain),
+        );
+        say(
+            self.grip_mm != other.grip_mm,
+            format!("grips of {} mm", self.grip_mm),
+        );
         say(self.poisson != other.poisson, format!("ν {}", self.poisson));
         say(
             self.tissue != other.tissue,
@@ -174,7 +189,10 @@ mod tests {
             c.load_in_words(),
             "Compression by 0.42 % along z: the outer 0.6 mm at each end move as rigid plates and are free to slide sideways (no friction); the sides are free."
         );
-        assert!(c.tissue_in_words().contains("1000 MPa everywhere, the program's default"));
+        assert!(
+            c.tissue_in_words()
+                .contains("1000 MPa everywhere, the program's default")
+        );
         let other = Condition::of(&row("a", 0.0).key);
         assert_eq!(c.difference(&other), "grips of 0.6 mm");
     }

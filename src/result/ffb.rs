@@ -88,7 +88,9 @@ fn note(a: &Row, b: &Row) -> Option<String> {
         );
     }
     let all = parts().filter_map(|row| row.marks.note.as_deref());
-    let warnings = all.flat_map(|all| all.split("; ")).filter(|n| n.starts_with(WARNING));
+    let warnings = all
+        .flat_map(|all| all.split("; "))
+        .filter(|n| n.starts_with(WARNING));
     warnings.for_each(|warning| notes::add(&mut note, warning));
     note
 }

@@ -93,7 +93,9 @@ mod tests {
     #[test]
     fn a_note_stands_once_in_a_cell() {
         let mut cell = None;
-        ["one", "two", "one"].map(|note| add(&mut cell, note));
+        for note in ["one", "two", "one"] {
+            add(&mut cell, note);
+        }
         assert_eq!(cell.as_deref(), Some("one; two"));
     }
 }

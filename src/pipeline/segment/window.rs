@@ -144,7 +144,9 @@ pub(super) fn nothing_selected(lower: Option<f64>, upper: Option<f64>, grey: &Gr
             grey.max
         ),
         match (grey.min, grey.max) {
-            (0.0, 1.0) => "values of 0 and 1 are a mask: give --labels 1 (in a recipe labels = [1] and no lower, upper)",
+            (0.0, 1.0) => {
+                "values of 0 and 1 are a mask: give --labels 1 (in a recipe labels = [1] and no lower, upper)"
+            }
             _ => "choose a window inside that range (image's own units), or --otsu",
         },
     )

@@ -26,7 +26,10 @@ pub fn mann_whitney(a: &[f64], b: &[f64]) -> Option<MannWhitney> {
         std::cmp::Ordering::Equal => 0.5,
         std::cmp::Ordering::Less => 0.0,
     };
-    let u: f64 = a.iter().flat_map(|x| b.iter().map(move |y| pair(x, y))).sum();
+    let u: f64 = a
+        .iter()
+        .flat_map(|x| b.iter().map(move |y| pair(x, y)))
+        .sum();
     let pairs = (na * nb) as f64;
     let larger = u.max(pairs - u);
     let ties = ties(a, b);

@@ -26,7 +26,11 @@ pub(super) fn noncentral_cdf(t: f64, freedom: f64, noncentrality: f64) -> f64 {
     let density = |s: f64| match s {
         s if s <= 0.0 && freedom > 1.0 => 0.0,
         s => {
-            let power = if freedom == 1.0 { 0.0 } else { (freedom - 1.0) * s.ln() };
+            let power = if freedom == 1.0 {
+                0.0
+            } else {
+                (freedom - 1.0) * s.ln()
+            };
             (constant + power - 0.5 * freedom * s * s).exp()
         }
     };

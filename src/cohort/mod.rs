@@ -3,14 +3,17 @@
 pub mod earlier;
 pub mod job;
 pub mod manifest;
+pub mod outcome;
 mod plan;
 pub mod queue;
 pub mod scans;
 
 use crate::cohort::job::ScanJob;
+use crate::cohort::outcome::{
+    NOT_CONVERGED, NOT_MET, ScanResult, in_words, outcome, result, said_of_kept,
+};
 use crate::cohort::scans::Selection;
 use crate::command::estimate::{Estimate, estimate};
-use crate::command::in_words::answer_in_words;
 use crate::command::{Outcome, adaptive, answer, lattice, report, segment, solve};
 use crate::error::{Error, Result};
 use crate::io::{atomic, table};
@@ -21,10 +24,8 @@ use crate::record::failures;
 use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::results::Results;
-use crate::result::answer::{ScanFacts, best, line};
 use crate::result::row::Row;
 use indicatif::ProgressBar;
-use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -36,18 +37,6 @@ pub struct Resources {
     pub jobs: usize,
     /// Memory all scans together may take by estimate; None: what is free, less a tenth.
     pub memory_mib: Option<f64>,
-}
-
-/// What became of a scan.
-#[derive(Debug, Clone, Serialize)]
-pub struct ScanResult {
-    pub scan: String,
-    pub input: PathBuf,
-    /// `done`, `not converged`, `error not met`, `failed`, or `planned` in a dry run.
-    pub state: &'static str,
-    pub error: Option<String>,
-    pub rows: usize,
-    pub estimate: Estimate,
 }
 
 /// Takes every scan under `inputs` through segment, lattice and solve into `out/<scan>/`, then writes `out/results.csv`
@@ -231,16 +220,15 @@ impl Run<'_> {
             let dirs = [self.out.to_path_buf()];
             let answers = report::answers(&rows, &dirs, self.recipe.error);
             table::write(&self.out.join(report::ANSWERS), &answers.lines)?;
-            report::write(
-                &rows,
+            let sources = report::Sources {
+                rows: &rows,
                 answers,
-                &failures,
-                &self.recipe.report,
-                &dirs,
-                Some(recipe),
-                &self.out.join("report"),
-                self.session,
-            )?;
+                failures: &failures,
+                params: &self.recipe.report,
+                dirs: &dirs,
+                recipe: Some(recipe),
+            };
+            report::write(sources, &self.out.join("report"), self.session)?;
             self.say_where();
         }
         let results: Vec<ScanResult> = self
@@ -277,10 +265,6 @@ impl Run<'_> {
     }
 }
 
-/// States of a scan that ends a run with exit code 1.
-const NOT_CONVERGED: &str = "not converged";
-const NOT_MET: &str = "error not met";
-
 /// The steps of one scan.
 fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Result<Vec<Row>> {
     segment::segment(&job.input, dir, Some(&job.name), &job.segment, session)?;
@@ -310,77 +294,4 @@ fn failures(jobs: &[ScanJob], done: &[Option<Result<Vec<Row>>>]) -> Vec<Failure>
         })
     });
     failed.collect()
-}
-
-/// The answer, how many rows, and how many of them did not converge.
-fn in_words(rows: &[Row]) -> String {
-    let stalled = rows.iter().filter(|row| row.converged() == Some(false));
-    let stalled = match stalled.count() {
-        0 => String::new(),
-        n => format!(", {n} not converged"),
-    };
-    let answer = best(rows).map(|row| answer_in_words(&line(row, &ScanFacts::default())));
-    format!(
-        "{}; {} rows{stalled}",
-        answer.unwrap_or("no modulus".to_owned()),
-        rows.len()
-    )
-}
-
-/// Whether all that was solved is what an earlier run left.
-fn said_of_kept(rows: &[Row], before: &[Row]) -> &'static str {
-    let mut solved = rows.iter().filter(|row| !row.key.is_derived()).peekable();
-    let kept = |row: &Row| {
-        before
-            .iter()
-            .any(|old| old.key == row.key && old.solved == row.solved)
-    };
-    match solved.peek().is_some() && solved.all(kept) {
-        true => "  [up to date: kept from an earlier run]",
-        false => "",
-    }
-}
-
-/// `target`: the stated error asked for, if any.
-fn result(
-    job: &ScanJob,
-    estimate: Estimate,
-    solved: Option<Result<Vec<Row>>>,
-    target: Option<f64>,
-) -> ScanResult {
-    let missed = |rows: &[Row]| {
-        let broken = rows.iter().all(Row::is_disconnected);
-        target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
-    };
-    let (state, error, rows) = match solved {
-        Some(Ok(rows)) if missed(&rows) => (NOT_MET, None, rows.len()),
-        Some(Ok(rows)) if rows.iter().any(|row| row.converged() == Some(false)) => {
-            (NOT_CONVERGED, None, rows.len())
-        }
-        Some(Ok(rows)) => ("done", None, rows.len()),
-        Some(Err(e)) => ("failed", Some(e.to_string()), 0),
-        None => ("planned", None, 0),
-    };
-    ScanResult {
-        scan: job.name.clone(),
-        input: job.input.clone(),
-        state,
-        error,
-        rows,
-        estimate,
-    }
-}
-
-fn outcome(results: &[ScanResult]) -> Outcome {
-    let in_state = |state: &'static str| results.iter().filter(move |r| r.state == state);
-    let failed: Vec<String> = in_state("failed").map(|r| r.scan.clone()).collect();
-    let short = [NOT_CONVERGED, NOT_MET];
-    match (
-        failed.is_empty(),
-        short.iter().any(|s| in_state(s).next().is_some()),
-    ) {
-        (false, _) => Outcome::SomeFailed(failed),
-        (true, true) => Outcome::NotConverged,
-        (true, false) => Outcome::Done,
-    }
 }

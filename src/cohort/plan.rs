@@ -1,7 +1,7 @@
 //! Owns the dry run: what each scan would need, without writing anything.
 
-use super::{ScanResult, result};
 use crate::cohort::job::ScanJob;
+use crate::cohort::outcome::{ScanResult, result};
 use crate::command::estimate::{Estimate, of_specimen};
 use crate::command::segment;
 use crate::machine::host;

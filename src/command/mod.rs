@@ -15,7 +15,6 @@ pub mod scene;
 pub mod segment;
 pub mod solve;
 pub mod stiffness;
-mod stiffness_page;
 
 /// How a command ended when nothing stopped it. Everything else is an [`crate::error::Error`] (exit 2).
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,6 +1,5 @@
 //! Owns tables as a page shows them: cells with what they are sorted by, and numbers in a reader's digits.
 
-use crate::report::markdown::digits;
 use serde::Serialize;
 
 /// A table as the page shows it; numbers are sorted as numbers.
@@ -186,6 +185,18 @@ pub fn places(error: f64) -> usize {
     }
 }
 
+/// Four significant digits; missing values are `NA`.
+pub fn digits(value: Option<f64>) -> String {
+    match value {
+        None => "NA".to_owned(),
+        Some(v) if v == 0.0 || !v.is_finite() => v.to_string(),
+        Some(v) => {
+            let before = v.abs().log10().floor() as i32 + 1;
+            format!("{v:.*}", (4 - before).clamp(0, 8) as usize)
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -210,5 +221,19 @@ mod tests {
         assert_eq!(p_value(Some(0.00441)).text, "0.0044");
         assert_eq!(p_value(Some(0.10151)).text, "0.102");
         assert_eq!(interval(Some(-1.234), Some(8.765)).text, "-1.2 to 8.8");
+    }
+
+    #[test]
+    fn numbers_have_four_digits() {
+        for (value, text) in [
+            (81.43219, "81.43"),
+            (0.012345, "0.01235"),
+            (12345.6, "12346"),
+            (0.0, "0"),
+            (999.96, "1000.0"),
+        ] {
+            assert_eq!(digits(Some(value)), text);
+        }
+        assert_eq!(digits(None), "NA");
     }
 }

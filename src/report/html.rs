@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::report::answers;
 use crate::report::cells::{Cell, Table, length, link, number, records, text, with_error};
 use crate::report::figure::Figure;
-use crate::report::groups;
+use crate::report::group_tables;
 use crate::report::plot;
 use crate::report::{Model, Report};
 use base64::Engine;
@@ -88,9 +88,9 @@ pub fn render(report: &Report, pages: &[ScanPage], source: &Source) -> Result<St
         conditions => &report.answers.conditions,
         notes => &report.notes,
         answers => plain(&answers::table(&report.answers)),
-        groups => plain(&groups::lines_table(&report.groups)),
-        comparisons => plain(&groups::comparisons_table(&report.groups)),
-        on_errors => groups::ON_ERRORS,
+        groups => plain(&group_tables::lines_table(&report.groups)),
+        comparisons => plain(&group_tables::comparisons_table(&report.groups)),
+        on_errors => group_tables::ON_ERRORS,
         figures => shown_all(figures),
         solves => plain(&solves(report)),
         method_notes => &report.method_notes,

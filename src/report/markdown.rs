@@ -1,8 +1,9 @@
 //! Owns the report as Markdown: the tables of the page, the figures by file name, the notes.
 
+use crate::report::cells::digits;
 use crate::report::figure::Figure;
 use crate::report::statistics::{AgreementLine, RegressionLine, Statistics};
-use crate::report::{Report, answers, groups, html};
+use crate::report::{Report, answers, group_tables, html};
 
 /// The report's text, with the tables of the page. Figures are `STEM.svg` beside it.
 pub fn render(report: &Report) -> String {
@@ -17,12 +18,12 @@ pub fn render(report: &Report) -> String {
     if !report.groups.lines.is_empty() {
         text += &format!(
             "\n## Groups\n\n{}",
-            groups::lines_table(&report.groups).markdown()
+            group_tables::lines_table(&report.groups).markdown()
         );
     }
     if !report.groups.comparisons.is_empty() {
-        let table = groups::comparisons_table(&report.groups);
-        text += &format!("\n{}\n{}\n", table.markdown(), groups::ON_ERRORS);
+        let table = group_tables::comparisons_table(&report.groups);
+        text += &format!("\n{}\n{}\n", table.markdown(), group_tables::ON_ERRORS);
     }
     text += &format!("\n## All solves\n\n{}", html::solves(report).markdown());
     if !report.method_notes.is_empty() {
@@ -81,35 +82,4 @@ fn figure_text(figure: &Figure) -> String {
         ..
     } = figure;
     format!("\n### {title}\n\n![{title}]({stem}.svg)\n\n{caption}\n")
-}
-
-/// Four significant digits; missing values are `NA`.
-pub fn digits(value: Option<f64>) -> String {
-    match value {
-        None => "NA".to_owned(),
-        Some(v) if v == 0.0 || !v.is_finite() => v.to_string(),
-        Some(v) => {
-            let before = v.abs().log10().floor() as i32 + 1;
-            format!("{v:.*}", (4 - before).clamp(0, 8) as usize)
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_have_four_digits() {
-        for (value, text) in [
-            (81.43219, "81.43"),
-            (0.012345, "0.01235"),
-            (12345.6, "12346"),
-            (0.0, "0"),
-            (999.96, "1000.0"),
-        ] {
-            assert_eq!(digits(Some(value)), text);
-        }
-        assert_eq!(digits(None), "NA");
-    }
 }

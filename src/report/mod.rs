@@ -2,6 +2,7 @@
 
 pub mod answers;
 pub mod cells;
+mod group_tables;
 pub mod groups;
 pub mod html;
 pub mod markdown;

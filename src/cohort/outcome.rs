@@ -1,0 +1,100 @@
+//! Owns what became of each scan of a run, and of the run.
+
+use crate::cohort::job::ScanJob;
+use crate::command::estimate::Estimate;
+use crate::command::in_words::answer_in_words;
+use crate::command::{Outcome, adaptive};
+use crate::error::Result;
+use crate::result::answer::{ScanFacts, best, line};
+use crate::result::row::Row;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What became of a scan.
+#[derive(Debug, Clone, Serialize)]
+pub struct ScanResult {
+    pub scan: String,
+    pub input: PathBuf,
+    /// `done`, `not converged`, `error not met`, `failed`, or `planned` in a dry run.
+    pub state: &'static str,
+    pub error: Option<String>,
+    pub rows: usize,
+    pub estimate: Estimate,
+}
+
+/// States of a scan that ends a run with exit code 1.
+pub(super) const NOT_CONVERGED: &str = "not converged";
+pub(super) const NOT_MET: &str = "error not met";
+
+/// The answer, how many rows, and how many of them did not converge.
+pub(super) fn in_words(rows: &[Row]) -> String {
+    let stalled = rows.iter().filter(|row| row.converged() == Some(false));
+    let stalled = match stalled.count() {
+        0 => String::new(),
+        n => format!(", {n} not converged"),
+    };
+    let answer = best(rows).map(|row| answer_in_words(&line(row, &ScanFacts::default())));
+    format!(
+        "{}; {} rows{stalled}",
+        answer.unwrap_or("no modulus".to_owned()),
+        rows.len()
+    )
+}
+
+/// Whether all that was solved is what an earlier run left.
+pub(super) fn said_of_kept(rows: &[Row], before: &[Row]) -> &'static str {
+    let mut solved = rows.iter().filter(|row| !row.key.is_derived()).peekable();
+    let kept = |row: &Row| {
+        before
+            .iter()
+            .any(|old| old.key == row.key && old.solved == row.solved)
+    };
+    match solved.peek().is_some() && solved.all(kept) {
+        true => "  [up to date: kept from an earlier run]",
+        false => "",
+    }
+}
+
+/// `target`: the stated error asked for, if any.
+pub(super) fn result(
+    job: &ScanJob,
+    estimate: Estimate,
+    solved: Option<Result<Vec<Row>>>,
+    target: Option<f64>,
+) -> ScanResult {
+    let missed = |rows: &[Row]| {
+        let broken = rows.iter().all(Row::is_disconnected);
+        target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
+    };
+    let (state, error, rows) = match solved {
+        Some(Ok(rows)) if missed(&rows) => (NOT_MET, None, rows.len()),
+        Some(Ok(rows)) if rows.iter().any(|row| row.converged() == Some(false)) => {
+            (NOT_CONVERGED, None, rows.len())
+        }
+        Some(Ok(rows)) => ("done", None, rows.len()),
+        Some(Err(e)) => ("failed", Some(e.to_string()), 0),
+        None => ("planned", None, 0),
+    };
+    ScanResult {
+        scan: job.name.clone(),
+        input: job.input.clone(),
+        state,
+        error,
+        rows,
+        estimate,
+    }
+}
+
+pub(super) fn outcome(results: &[ScanResult]) -> Outcome {
+    let in_state = |state: &'static str| results.iter().filter(move |r| r.state == state);
+    let failed: Vec<String> = in_state("failed").map(|r| r.scan.clone()).collect();
+    let short = [NOT_CONVERGED, NOT_MET];
+    match (
+        failed.is_empty(),
+        short.iter().any(|s| in_state(s).next().is_some()),
+    ) {
+        (false, _) => Outcome::SomeFailed(failed),
+        (true, true) => Outcome::NotConverged,
+        (true, false) => Outcome::Done,
+    }
+}

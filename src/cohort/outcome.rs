@@ -5,7 +5,7 @@ use crate::command::estimate::Estimate;
 use crate::command::in_words::answer_in_words;
 use crate::command::{Outcome, adaptive};
 use crate::error::Result;
-use crate::result::answer::{ScanFacts, best, line};
+use crate::result::answer::{AnswerLine, ScanFacts, best, line};
 use crate::result::row::Row;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -19,6 +19,8 @@ pub struct ScanResult {
     pub state: &'static str,
     pub error: Option<String>,
     pub rows: usize,
+    /// None where nothing was solved.
+    pub answer: Option<AnswerLine>,
     pub estimate: Estimate,
 }
 
@@ -66,6 +68,16 @@ pub(super) fn result(
         let broken = rows.iter().all(Row::is_disconnected);
         target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
     };
+    let answer = match &solved {
+        Some(Ok(rows)) => best(rows).map(|row| {
+            let facts = ScanFacts {
+                target,
+                ..ScanFacts::default()
+            };
+            line(row, &facts)
+        }),
+        _ => None,
+    };
     let (state, error, rows) = match solved {
         Some(Ok(rows)) if missed(&rows) => (NOT_MET, None, rows.len()),
         Some(Ok(rows)) if rows.iter().any(|row| row.converged() == Some(false)) => {
@@ -81,6 +93,7 @@ pub(super) fn result(
         state,
         error,
         rows,
+        answer,
         estimate,
     }
 }

@@ -228,7 +228,7 @@ fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
 /// Fields, curves and models that were asked for.
 fn files(dir: &Path) -> Vec<String> {
     let wanted = |name: &str| {
-        name.starts_with("field")
+        name.starts_with("field") && !name.ends_with(".png")
             || name.ends_with(".inp")
             || name == "curve.csv"
             || name == "fracture.csv"

@@ -54,9 +54,15 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
     // Means of older programs do not say whether they are converged.
     let rows = with_ffb(&rows);
     let answers = answers(&rows, dirs, None);
-    write(
-        &rows, answers, &failures, &params, dirs, recipe, out, session,
-    )
+    let sources = Sources {
+        rows: &rows,
+        answers,
+        failures: &failures,
+        params: &params,
+        dirs,
+        recipe,
+    };
+    write(sources, out, session)
 }
 
 /// The answers of `rows`, with what the folders of the scans, under `dirs`, say of them. `target` is the relative error asked for;

@@ -1,6 +1,8 @@
 //! Owns the recipe file: all stages' settings in TOML, unknown keys refused with the nearest known one named.
 
 use crate::error::{Error, Result};
+use crate::image::scan;
+use crate::io::percent;
 use crate::pipeline::apparent::SolveParams;
 use crate::pipeline::lattice::LatticeParams;
 use crate::pipeline::segment::SegmentParams;
@@ -9,12 +11,41 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;
 
+/// The recipes that are in the program: name and text.
+pub const BUILT_IN: [(&str, &str); 4] = [
+    ("paper", include_str!("../pipelines/paper.toml")),
+    ("quick", include_str!("../pipelines/quick.toml")),
+    ("to-an-error", include_str!("../pipelines/to-an-error.toml")),
+    (
+        "bcc-against-sc",
+        include_str!("../pipelines/bcc-against-sc.toml"),
+    ),
+];
+
+/// The text of a recipe that is in the program.
+///
+/// # Errors
+/// None of this name.
+pub fn built_in(name: &str) -> Result<&'static str> {
+    let found = BUILT_IN.iter().find(|(known, _)| *known == name);
+    let names = BUILT_IN.map(|(known, _)| known).join(", ");
+    let none = || {
+        Error::setting(
+            "recipe",
+            format!("no recipe in the program is named `{name}`"),
+            format!("name one of {names}"),
+        )
+    };
+    found.map(|(_, text)| *text).ok_or_else(none)
+}
+
 /// Settings of a whole run. What a file leaves out takes its default.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Recipe {
     /// Stated error asked for, algebraic and discretisation (0.03 is 3 %). Method and resolution then follow from it, and
     /// what `[lattice]` says is not used.
+    #[serde(deserialize_with = "percent::optional")]
     pub error: Option<f64>,
     pub segment: SegmentParams,
     pub lattice: LatticeParams,
@@ -23,13 +54,31 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// Reads a recipe file.
+    /// Reads a recipe file, or, where there is none of this name, the recipe in the program.
+    ///
+    /// # Errors
+    /// No such recipe, a scan in its place, unknown keys, unusable values.
     pub fn read(path: &Path) -> Result<Recipe> {
+        let name = path.to_str().filter(|_| !path.exists());
+        if let Some(text) = name.and_then(|name| built_in(name).ok()) {
+            return Recipe::parse(text, path);
+        }
+        if path.is_dir() || scan::is_scan_file(path) {
+            return Err(Error::file(
+                path,
+                "is a scan or a folder, where a recipe was expected",
+                "give the recipe first, then the scans: bonepd-ct run quick.toml SCAN -o OUT (`bonepd-ct recipe` lists recipes)",
+            ));
+        }
         let text = std::fs::read_to_string(path).map_err(|e| {
+            let found = match e.kind() {
+                std::io::ErrorKind::InvalidData => "it is not text".to_owned(),
+                _ => e.to_string(),
+            };
             Error::file(
                 path,
-                format!("expected a recipe, could not read it: {e}"),
-                "name a TOML file with tables [segment], [lattice], [solve], [report]; `pipelines/` has examples",
+                format!("expected a recipe, could not read it: {found}"),
+                "name a TOML file with tables [segment], [lattice], [solve], [report], before the scans; or a recipe in the program: paper, quick, to-an-error, bcc-against-sc (`bonepd-ct recipe NAME` prints one)",
             )
         })?;
         Recipe::parse(&text, path)
@@ -64,7 +113,7 @@ fn not_toml(path: &Path, e: &toml::de::Error) -> Error {
     Error::file(
         path,
         format!("not a valid recipe\n{e}"),
-        "correct the line shown; `pipelines/paper.toml` shows every key",
+        "correct the line shown; `bonepd-ct recipe paper` shows every key",
     )
 }
 
@@ -135,6 +184,39 @@ mod tests {
         assert!(words.contains("poisson"), "{words}");
         let words = parse("error = 3.0").unwrap_err().to_string();
         assert!(words.contains("0.03 is 3 %"), "{words}");
+    }
+
+    #[test]
+    fn shares_are_numbers_or_percentages() {
+        let recipe =
+            parse("error = \"5%\"\n[solve]\ntolerance = \"0.1%\"\nstrain = \"-1%\"\n").unwrap();
+        assert_eq!(recipe.error, Some(0.05));
+        assert_eq!(
+            (recipe.solve.tolerance, recipe.solve.strain),
+            (0.001, -0.01)
+        );
+        assert_eq!(parse("[solve]\nstrain = 1").unwrap().solve.strain, 1.0);
+        let words = parse("[solve]\ntolerance = \"fine\"")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            words.contains("percentage") && words.contains("line 2"),
+            "{words}"
+        );
+    }
+
+    #[test]
+    fn recipes_in_the_program_are_recipes() {
+        for (name, text) in BUILT_IN {
+            assert!(Recipe::read(Path::new(name)).is_ok(), "{name}");
+            assert_eq!(built_in(name).unwrap(), text);
+        }
+        assert!(
+            built_in("papre")
+                .unwrap_err()
+                .to_string()
+                .contains("to-an-error")
+        );
     }
 
     #[test]

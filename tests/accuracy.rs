@@ -94,7 +94,10 @@ fn an_error_that_cannot_be_met_is_said_in_words() {
     let out = phantom(dir.path());
     let (code, _, words) = run(&["solve", &out, "--error", "0.01%", "--threads", "2"]);
     assert_eq!(code, 1, "{words}");
-    assert!(words.contains("could not be met"), "{words}");
+    assert!(
+        words.contains("cannot reach the error asked for"),
+        "{words}"
+    );
 }
 
 #[test]

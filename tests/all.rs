@@ -1,6 +1,7 @@
 //! One test program. Each module is one subject.
 
 mod accuracy;
+mod answers;
 mod apparent;
 mod cli;
 mod cohort;
@@ -29,6 +30,7 @@ mod report;
 mod scan_headers;
 mod scenes;
 mod segment;
+mod slips;
 mod specimens;
 mod stability;
 mod stiffness;

@@ -16,7 +16,7 @@ pub fn run(args: &[&str]) -> (i32, String, String) {
     )
 }
 
-const VERBS: [&str; 9] = [
+const VERBS: [&str; 11] = [
     "segment",
     "lattice",
     "solve",
@@ -25,6 +25,8 @@ const VERBS: [&str; 9] = [
     "phantom",
     "info",
     "scene",
+    "recipe",
+    "columns",
     "completions",
 ];
 

@@ -299,16 +299,16 @@ fn a_scan_that_bears_no_load_is_told_as_such_and_named_once() {
     let out = dir.path().join("out");
     let words = ["run", text(&recipe), text(&scans), "-o", text(&out)];
     let floppy = [&words[..], &["--boundary", "floppy"]].concat();
-    let (code, _, said) = run(&[&floppy[..], &["--dry-run"]].concat());
+    let (code, said, _) = run(&[&floppy[..], &["--dry-run"]].concat());
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("no bone from face to face"), "{said}");
-    let (code, _, said) = run(&floppy);
+    let (code, answer, said) = run(&floppy);
     assert_eq!(code, 0, "{said}");
     let warning = said.lines().find(|line| line.contains("removed")).unwrap();
     assert_eq!(warning.matches("gap").count(), 1, "{warning}");
     assert!(
-        said.contains("gap: 2 rows; floppy 0.15 mm: E_app 0.000 MPa"),
-        "{said}"
+        answer.contains("gap (1 of 1): E_app 0.000 ± 0.000 MPa (0.0 %) by floppy 0.15 mm; 2 rows"),
+        "{answer}"
     );
 }
 

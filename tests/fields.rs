@@ -179,9 +179,9 @@ fn fields_are_written_on_the_scans_grid() {
     nifti::write(&dir.path().join("scan.nii"), &image).unwrap();
     let (scan, out) = (path("scan.nii"), path("out"));
     let ok = |args: &[&str]| {
-        let (code, _, stderr) = run(args);
+        let (code, stdout, stderr) = run(args);
         assert_eq!(code, 0, "{stderr}");
-        stderr
+        stdout
     };
     ok(&["segment", &scan, "-o", &out, "--lower", "1"]);
     let solve = [
@@ -208,6 +208,7 @@ fn fields_are_written_on_the_scans_grid() {
             .is_file()
     );
     assert!(!dir.path().join("out/field-von-mises-mpa.nii.gz").exists());
+    assert!(dir.path().join("out/field-sed-mpa.png").is_file());
     let vti = std::fs::read(dir.path().join("out/fields.vti")).unwrap();
     assert!(String::from_utf8_lossy(&vti).contains("Origin=\"2.99 -2.01 0.99\""));
     assert!(said.contains("failure load 0.067 N"), "{said}");

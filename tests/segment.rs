@@ -87,7 +87,7 @@ fn a_dry_run_writes_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let (scan, out) = (dir.path().join("bar.nii.gz"), dir.path().join("out"));
     bar(&scan);
-    let (code, _, stderr) = run(&[
+    let (code, stdout, stderr) = run(&[
         "segment",
         text(&scan),
         "-o",
@@ -97,7 +97,7 @@ fn a_dry_run_writes_nothing() {
         "--dry-run",
     ]);
     assert_eq!(code, 0, "{stderr}");
-    assert!(stderr.contains("160 bone voxels"), "{stderr}");
+    assert!(stdout.contains("160 bone voxels"), "{stdout}");
     assert!(!out.exists());
 }
 

@@ -1,10 +1,13 @@
 //! The command line: one file per verb. Words become validated plain data here; the library does the rest.
 
+mod columns;
 mod completions;
+mod hints;
 mod info;
 mod lattice;
 mod phantom;
 mod phantom_body;
+mod recipe;
 mod report;
 mod run;
 mod scene;
@@ -22,7 +25,7 @@ use serde::Serialize;
 /// From a μCT scan of trabecular bone to its apparent stiffness, with a stated error.
 ///
 /// A scan goes through four steps, each a command of its own: `segment` finds the bone, `lattice` lays lattices over it,
-/// `solve` compresses them and yields the apparent modulus E_app, `report` turns the results of many scans into tables and
+/// `solve` compresses them and computes the apparent modulus E_app, `report` turns the results of many scans into tables and
 /// figures. `run` does all four from a recipe file, on one scan or on a folder of scans.
 #[derive(Parser)]
 #[command(name = "bonepd-ct", version, after_help = EXAMPLES, max_term_width = 110)]
@@ -35,12 +38,13 @@ pub struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
-  bonepd-ct run pipelines/quick.toml scan.nii.gz -o out
+  bonepd-ct run quick scan.nii.gz -o out
   bonepd-ct segment slices/ -o out --spacing 0.0195 --gaussian 1 --lower 63
   bonepd-ct solve out --young-mpa 1000 --poisson 0.3
   bonepd-ct report out -o out/report
 
 Exit code: 0 done; 1 not converged, or some scans failed (results written, marked); 2 usage or unreadable input.
+Results go to stdout, progress and warnings to stderr. `bonepd-ct columns` says what the columns of the tables mean.
 Units: mm, N, MPa, s. A negative strain is compression.";
 
 /// Flags of every command.
@@ -49,10 +53,10 @@ struct Shared {
     /// Threads to compute with [default: one per core]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), help_heading = "Shared")]
     threads: Option<u16>,
-    /// Only warnings and errors on stderr
+    /// No progress and no remarks: results on stdout, warnings and errors on stderr
     #[arg(long, global = true, help_heading = "Shared")]
     quiet: bool,
-    /// More detail on stderr
+    /// More detail; of a run also the results of each solve
     #[arg(
         short,
         long,
@@ -61,13 +65,13 @@ struct Shared {
         help_heading = "Shared"
     )]
     verbose: bool,
-    /// Print the result as JSON on stdout
+    /// Print the result as JSON on stdout, and nothing else there
     #[arg(long, global = true, help_heading = "Shared")]
     json: bool,
     /// Check the input and say what would be done; write nothing
     #[arg(long, global = true, help_heading = "Shared")]
     dry_run: bool,
-    /// Redo what is up to date
+    /// Recompute even where results are up to date
     #[arg(long, global = true, help_heading = "Shared")]
     force: bool,
 }
@@ -82,12 +86,18 @@ enum Verb {
     Phantom(phantom::PhantomArgs),
     Info(info::InfoArgs),
     Scene(scene::SceneArgs),
+    Recipe(recipe::RecipeArgs),
+    Columns(columns::ColumnsArgs),
     Completions(completions::CompletionsArgs),
 }
 
-/// Parses the words and carries out the command. Bad usage ends the process here with clap's message and exit code 2.
+/// Parses the words and carries out the command. Bad usage ends the process here with clap's message, a hint where there is
+/// one, and exit code 2.
 pub fn run() -> Result<Outcome> {
-    let cli = Cli::parse();
+    let cli = Cli::try_parse().unwrap_or_else(|error| refuse(&error));
+    if cli.verb.keeps_what_it_finished() {
+        bonepd_ct::machine::interrupt::say_how_to_go_on();
+    }
     let session = session(&cli.shared)?;
     let json = cli.shared.json;
     match &cli.verb {
@@ -99,7 +109,26 @@ pub fn run() -> Result<Outcome> {
         Verb::Phantom(args) => phantom::run(args, &session, json),
         Verb::Info(args) => info::run(args, json),
         Verb::Scene(args) => scene::run(args, &session, json),
+        Verb::Recipe(args) => recipe::run(args),
+        Verb::Columns(args) => columns::run(args, json),
         Verb::Completions(args) => completions::run(args),
+    }
+}
+
+/// Prints what clap says, help and version among it, and ends the process.
+fn refuse(error: &clap::Error) -> ! {
+    use std::io::Write;
+    let _ = error.print();
+    if let Some(words) = hints::hint(error) {
+        let _ = writeln!(std::io::stderr(), "\nhint: {words}");
+    }
+    std::process::exit(error.exit_code())
+}
+
+impl Verb {
+    /// Stopped, the same command goes on from there.
+    fn keeps_what_it_finished(&self) -> bool {
+        matches!(self, Verb::Run(_) | Verb::Solve(_))
     }
 }
 
@@ -114,6 +143,7 @@ fn session(shared: &Shared) -> Result<Session> {
         threads: shared.threads.map(usize::from),
         quiet: shared.quiet,
         verbose: shared.verbose,
+        json: shared.json,
         dry_run: shared.dry_run,
         force: shared.force,
         ..Session::default()

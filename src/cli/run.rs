@@ -21,7 +21,7 @@ use std::path::PathBuf;
 /// the recipe's. Started again, a run keeps what is up to date and goes on where it was stopped.
 #[derive(Args)]
 pub struct RunArgs {
-    /// Recipe file (TOML); `pipelines/` has examples
+    /// Recipe file (TOML), or the name of a recipe in the program: paper, quick, to-an-error, bcc-against-sc (`bonepd-ct recipe`)
     recipe: PathBuf,
     /// Scans, folders of scans (a folder of slices is one scan), or manifests (.csv with a column path, and any of name,
     /// subject, group, spacing_mm, lower, upper, otsu, gaussian_voxels)

@@ -41,10 +41,10 @@ pub struct SegmentSettings {
     /// leaves files without a calibration as they are, where hu refuses them [default: native, with a warning]
     #[arg(long, value_name = "UNIT", value_parser = words::choice::<GreyUnit>(&["native", "hu", "mgha", "hu-where-known"]))]
     units: Option<GreyUnit>,
-    /// Bone is this value or more, in the image's own units, after smoothing
+    /// Lower threshold (inclusive), in grey values of the image, applied after smoothing
     #[arg(long, value_name = "V", value_parser = words::number, allow_negative_numbers = true)]
     lower: Option<f64>,
-    /// Bone is this value or less
+    /// Upper threshold (inclusive)
     #[arg(long, value_name = "V", value_parser = words::number, allow_negative_numbers = true)]
     upper: Option<f64>,
     /// Otsu's threshold instead of a window
@@ -141,6 +141,7 @@ impl SegmentSettings {
 pub fn run(args: &SegmentArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut params = SegmentParams::default();
     args.settings.apply(&mut params)?;
+    bonepd_ct::cohort::scans::refuse_many(&args.input)?;
     let summary =
         bonepd_ct::command::segment::segment(&args.input, &args.out, None, &params, session)?;
     if json {

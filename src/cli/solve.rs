@@ -2,7 +2,7 @@
 
 use super::settings::{LatticeSettings, TissueSettings};
 use super::{print_json, words};
-use bonepd_ct::command::Outcome;
+use bonepd_ct::command::{Outcome, run_settings};
 use bonepd_ct::error::Result;
 use bonepd_ct::grid::Axis;
 use bonepd_ct::machine::session::Session;
@@ -11,7 +11,7 @@ use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, S
 use clap::Args;
 use std::path::PathBuf;
 
-/// Load a segmented scan and yield its apparent modulus E_app
+/// Compress a segmented scan and compute its apparent modulus E_app
 ///
 /// Solves every lattice asked for here or by `lattice` before, and writes DIR/results.csv (one row per solve) and
 /// DIR/results.json (the same with provenance) after each.
@@ -46,8 +46,8 @@ pub struct SolveSettings {
     /// Poisson's ratio of the bone tissue, below 0.5 [default: 0.3]
     #[arg(long, value_name = "NU", value_parser = words::number, allow_negative_numbers = true)]
     poisson: Option<f64>,
-    /// Nominal strain; negative is compression [default: -0.01]
-    #[arg(long, value_name = "S", value_parser = words::number, allow_negative_numbers = true)]
+    /// Nominal strain, as -1% or -0.01; negative is compression [default: -0.01]
+    #[arg(long, value_name = "S", value_parser = words::strain, allow_hyphen_values = true)]
     strain: Option<f64>,
     /// Thickness of each grip in mm; 0 grips the end planes [default: 0]
     #[arg(long, value_name = "MM", value_parser = words::number)]
@@ -55,7 +55,7 @@ pub struct SolveSettings {
     /// uniaxial, confined (sides held), or stiffness (voxel-fe: all six unit strains, to DIR/stiffness.json) [default: uniaxial]
     #[arg(long, value_parser = words::choice::<Load>(&["uniaxial", "confined", "stiffness"]))]
     load: Option<Load>,
-    /// Whether the gripped ends may slide sideways: free, or bonded [default: free]
+    /// free: the loaded ends slide sideways (no friction); bonded: they are held sideways [default: free]
     #[arg(long, value_parser = words::choice::<Ends>(&["free", "bonded"]))]
     ends: Option<Ends>,
     /// --load stiffness: what the unit strains do on the faces: kinematic (an upper bound), or mixed
@@ -81,7 +81,7 @@ pub struct SolveSettings {
     /// fraction) [default: threshold]
     #[arg(long, value_name = "RULE", value_parser = words::choice::<CoarsenBy>(&["threshold", "fraction"]), requires = "coarsen")]
     coarsen_by: Option<CoarsenBy>,
-    /// Also count mechanisms (motions that cost next to no energy); takes a factorisation, for small models
+    /// Count zero-energy modes (direct factorisation; small models only)
     #[arg(long)]
     mechanisms: bool,
     /// Fields to write, comma-separated: displacement (mm), sed (strain energy density, MPa), von-mises (MPa, voxel-fe only),
@@ -135,7 +135,7 @@ impl SolveSettings {
 }
 
 pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
-    let mut params = SolveParams::default();
+    let mut params = start(args, session);
     args.settings.apply(&mut params)?;
     let mut lattice = bonepd_ct::command::lattice::settings(&args.dir)?;
     args.lattice.apply(&mut lattice)?;
@@ -153,6 +153,9 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
             (rows, true)
         }
     };
+    if !session.dry_run {
+        bonepd_ct::command::answer::keep(&args.dir, &rows, args.error)?;
+    }
     if json {
         print_json(&rows);
     }
@@ -162,4 +165,17 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
             false => Outcome::Done,
         },
     )
+}
+
+/// The settings that options are laid over: those of the run that the folder belongs to, else the defaults.
+fn start(args: &SolveArgs, session: &Session) -> SolveParams {
+    let Some((path, params)) = run_settings::of_run(&args.dir) else {
+        return SolveParams::default();
+    };
+    session.say(format!(
+        "note: settings of the run ({}) are taken, options here win: {}",
+        path.display(),
+        run_settings::in_words(&params)
+    ));
+    params
 }

@@ -1,5 +1,6 @@
 //! Owns the words of the command line: lists, percentages, crops, choices; from text to plain values.
 
+use bonepd_ct::io::percent;
 use bonepd_ct::physics::material::{Label, Law};
 use bonepd_ct::pipeline::segment::{Align, Voi};
 use clap::builder::{OsStringValueParser, PossibleValuesParser, TypedValueParser};
@@ -33,11 +34,28 @@ pub fn positive(word: &str) -> Result<f64, String> {
     })
 }
 
-/// `0.1%` or `0.001`, as a fraction.
+/// `0.1%` or `0.001`, as a share between 0 and 1.
 pub fn fraction(word: &str) -> Result<f64, String> {
-    match word.trim().strip_suffix('%') {
-        Some(percent) => positive(percent).map(|v| v / 100.0),
-        None => positive(word),
+    match percent::parse(word)? {
+        v if v > 0.0 && v < 1.0 => Ok(v),
+        v if v >= 1.0 => Err(format!(
+            "`{word}` is {} %: expected a share below 1, as 3% or 0.03",
+            100.0 * v
+        )),
+        _ => Err(format!(
+            "expected a share above 0, as 3% or 0.03, found `{word}`"
+        )),
+    }
+}
+
+/// `-1%` or `-0.01`; negative is compression.
+pub fn strain(word: &str) -> Result<f64, String> {
+    match percent::parse(word)? {
+        v if v.abs() < 1.0 => Ok(v),
+        v => Err(format!(
+            "`{word}` is {} % of the height: expected a strain below 1, as -1% or -0.01",
+            100.0 * v
+        )),
     }
 }
 
@@ -185,6 +203,9 @@ mod tests {
         assert_eq!(fraction("0.001"), Ok(0.001));
         assert!(fraction("-1%").is_err());
         assert!(fraction("x").is_err());
+        assert!(fraction("3").unwrap_err().contains("300 %"));
+        assert_eq!(strain("-1%"), Ok(-0.01));
+        assert!(strain("-1").unwrap_err().contains("-0.01"));
     }
 
     #[test]

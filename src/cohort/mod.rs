@@ -1,14 +1,18 @@
 //! Owns `run`: one recipe over scans and folders of scans, each scan on its own.
 
+pub mod earlier;
 pub mod job;
 pub mod manifest;
+pub mod outcome;
+mod plan;
 pub mod queue;
 pub mod scans;
 
 use crate::cohort::job::ScanJob;
+use crate::cohort::outcome::{ScanResult, State, in_words, outcome, result, said_of_kept};
 use crate::cohort::scans::Selection;
-use crate::command::estimate::{Estimate, estimate, of_specimen};
-use crate::command::{Outcome, adaptive, lattice, report, segment, solve};
+use crate::command::estimate::{Estimate, estimate};
+use crate::command::{Outcome, adaptive, answer, lattice, report, segment, solve};
 use crate::error::{Error, Result};
 use crate::io::{atomic, table};
 use crate::machine::host;
@@ -19,9 +23,7 @@ use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::results::Results;
 use crate::result::row::Row;
-use crate::result::settings::BoundaryRule;
 use indicatif::ProgressBar;
-use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -33,31 +35,6 @@ pub struct Resources {
     pub jobs: usize,
     /// Memory all scans together may take by estimate; None: what is free, less a tenth.
     pub memory_mib: Option<f64>,
-}
-
-/// What became of a scan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum State {
-    Done,
-    #[serde(rename = "not converged")]
-    NotConverged,
-    #[serde(rename = "error not met")]
-    ErrorNotMet,
-    Failed,
-    /// In a dry run.
-    Planned,
-}
-
-/// One scan of a run.
-#[derive(Debug, Clone, Serialize)]
-pub struct ScanResult {
-    pub scan: String,
-    pub input: PathBuf,
-    pub state: State,
-    pub error: Option<String>,
-    pub rows: usize,
-    pub estimate: Estimate,
 }
 
 /// Takes every scan under `inputs` through segment, lattice and solve into `out/<scan>/`, then writes `out/results.csv`
@@ -78,7 +55,9 @@ pub fn cohort(
     let mut segment = recipe.segment.clone();
     segment.keep_grey |= recipe.solve.material.is_some();
     let all = scans::find(inputs, &segment, selection, session)?;
-    let names = all.iter().map(|job| job.name.clone()).collect();
+    let mut names = earlier::names(out, &all);
+    earlier::say(&names, session);
+    names.extend(all.iter().map(|job| job.name.clone()));
     let jobs = match only {
         Some(name) => scans::only(&all, name)?,
         None => all,
@@ -88,13 +67,13 @@ pub fn cohort(
         .map(|job| estimate(&job.input, job.segment.spacing_mm, recipe))
         .collect::<Result<_>>()?;
     if session.dry_run {
-        let results = plan(recipe, &jobs, &estimates, out, session);
+        let results = plan::plan(recipe, &jobs, &estimates, out, session);
         return Ok((outcome(&results), results));
     }
     atomic::sweep(out);
     let session = &Session {
         shares_process: resources.jobs.min(jobs.len()) > 1,
-        ..session.clone()
+        ..session.with_warnings_once()
     };
     let run = Run {
         recipe,
@@ -102,9 +81,11 @@ pub fn cohort(
         names,
         jobs: &jobs,
         session,
-        bar: session.bar(jobs.len() as u64, "scans"),
+        bar: session.bar(jobs.len() as u64, "all scans"),
         done: Mutex::new(vec![None; jobs.len()]),
     };
+    run.bar
+        .set_message(format!("0 of {} scans done", jobs.len()));
     let memory: Vec<f64> = estimates.iter().map(|e| e.memory_mib).collect();
     let limit = resources
         .memory_mib
@@ -116,6 +97,7 @@ pub fn cohort(
         |i| run.scan(i),
     );
     run.bar.finish_and_clear();
+    session.repeated_warnings();
     run.finish(&estimates)
 }
 
@@ -144,6 +126,7 @@ impl Run<'_> {
             env!("CARGO_PKG_VERSION"),
             job.input.display()
         ));
+        let before: Vec<Row> = table::read(&dir.join(results::TABLE)).unwrap_or_default();
         let solved = catch_unwind(AssertUnwindSafe(|| steps(self.recipe, job, &dir, &own)))
             .unwrap_or_else(|_| {
                 Err(Error::specimen(
@@ -154,8 +137,12 @@ impl Run<'_> {
         match &solved {
             Ok(rows) => {
                 own.note("done");
-                self.session
-                    .say(format!("{}: {}", job.name, in_words(rows)));
+                let place = format!("{} ({} of {})", job.name, i + 1, self.jobs.len());
+                self.session.result(format!(
+                    "{place}: {}{}",
+                    in_words(rows),
+                    said_of_kept(rows, &before)
+                ));
             }
             Err(e) => {
                 own.note(&format!("failed: {e}"));
@@ -174,20 +161,19 @@ impl Run<'_> {
             self.session.warn(e.to_string());
         }
         self.bar.inc(1);
+        let finished = done.iter().flatten().count();
+        self.bar
+            .set_message(format!("{finished} of {} scans done", done.len()));
     }
 
-    /// All rows so far, in the order of the scans.
+    /// All rows so far, in the order of the scans: all that the folders of the scans hold, also of earlier runs.
     fn write_rows(&self, done: &[Option<Result<Vec<Row>>>]) -> Result<Vec<Row>> {
         let mut rows = Vec::new();
         for name in &self.names {
-            match self.job(name) {
-                Some(i) => rows.extend(done[i].iter().flatten().flatten().cloned()),
-                None => {
-                    let file = self.out.join(name).join(results::TABLE);
-                    if file.is_file() {
-                        rows.extend(table::read::<Row>(&file)?);
-                    }
-                }
+            let is_done = |i: usize| matches!(done[i], Some(Ok(_)));
+            let file = self.out.join(name).join(results::TABLE);
+            if self.job(name).is_none_or(is_done) && file.is_file() {
+                rows.extend(table::read::<Row>(&file)?);
             }
         }
         match rows.is_empty() {
@@ -195,6 +181,22 @@ impl Run<'_> {
             false => results::write_table(self.out, &rows)?,
         }
         Ok(rows)
+    }
+
+    /// The recipe as it is run. One of an earlier run that differs is kept beside it.
+    fn write_recipe(&self) -> Result<String> {
+        let recipe = toml::to_string(self.recipe).expect("settings are plain data");
+        let file = self.out.join(report::RECIPE);
+        if std::fs::read_to_string(&file).is_ok_and(|old| old != recipe) {
+            let _ = std::fs::rename(&file, self.out.join(report::OLD_RECIPE));
+            self.session.say(format!(
+                "note: an earlier run in {} had another recipe: its rows are kept beside the new ones, the recipe is {}",
+                self.out.display(),
+                report::OLD_RECIPE
+            ));
+        }
+        atomic::write(&file, &recipe)?;
+        Ok(recipe)
     }
 
     fn job(&self, name: &str) -> Option<usize> {
@@ -215,18 +217,20 @@ impl Run<'_> {
         failures.extend(known.filter(|failure| left_out(&failure.scan)));
         failures::write_failures(self.out, &failures)?;
         if !rows.is_empty() {
-            let recipe = toml::to_string(self.recipe).expect("settings are plain data");
-            atomic::write(&self.out.join(report::RECIPE), &recipe)?;
+            let recipe = self.write_recipe()?;
             let dirs = [self.out.to_path_buf()];
-            report::write(
-                &rows,
-                &failures,
-                &self.recipe.report,
-                &dirs,
-                Some(recipe),
-                &self.out.join("report"),
-                self.session,
-            )?;
+            let answers = report::answers(&rows, &dirs, self.recipe.error);
+            table::write(&self.out.join(report::ANSWERS), &answers.lines)?;
+            let sources = report::Sources {
+                rows: &rows,
+                answers,
+                failures: &failures,
+                params: &self.recipe.report,
+                dirs: &dirs,
+                recipe: Some(recipe),
+            };
+            report::write(sources, &self.out.join("report"), self.session)?;
+            self.say_where();
         }
         let results: Vec<ScanResult> = self
             .jobs
@@ -235,7 +239,31 @@ impl Run<'_> {
             .zip(done.drain(..))
             .map(|((job, estimate), solved)| result(job, *estimate, solved, self.recipe.error))
             .collect();
+        self.say_what_fell_short(&results);
         Ok((outcome(&results), results))
+    }
+
+    fn say_where(&self) {
+        self.session.result(format!(
+            "answers, one line a scan: {}; page: {}",
+            self.out.join(report::ANSWERS).display(),
+            self.out.join("report/report.html").display()
+        ));
+    }
+
+    /// Names the scans that fell short.
+    fn say_what_fell_short(&self, results: &[ScanResult]) {
+        for state in [State::NotConverged, State::ErrorNotMet] {
+            let names: Vec<&str> = results
+                .iter()
+                .filter(|r| r.state == state)
+                .map(|r| r.scan.as_str())
+                .collect();
+            if !names.is_empty() {
+                self.session
+                    .warn(format!("{}: {}", state.name(), names.join(", ")));
+            }
+        }
     }
 }
 
@@ -254,6 +282,7 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
         row.marks.subject.clone_from(&job.subject);
     }
     Results::open(dir, false)?.label(&job.group, &job.subject)?;
+    answer::keep(dir, &rows, recipe.error)?;
     Ok(rows)
 }
 
@@ -267,147 +296,4 @@ fn failures(jobs: &[ScanJob], done: &[Option<Result<Vec<Row>>>]) -> Vec<Failure>
         })
     });
     failed.collect()
-}
-
-/// How many rows, and the modulus of the last: the mean or the limit of the finest lattices, where there are several.
-fn in_words(rows: &[Row]) -> String {
-    let stalled = rows.iter().filter(|row| row.converged() == Some(false));
-    let stalled = match stalled.count() {
-        0 => String::new(),
-        n => format!(", {n} not converged"),
-    };
-    let modulus = rows.last().and_then(|row| {
-        let key = &row.key;
-        let kind = key.boundary.map_or(key.method.name(), BoundaryRule::name);
-        let e_app = row.e_app_mpa()?;
-        Some(format!("; {kind} {} mm: E_app {e_app:.3} MPa", key.lp_mm))
-    });
-    format!(
-        "{} rows{stalled}{}",
-        rows.len(),
-        modulus.unwrap_or_default()
-    )
-}
-
-/// `target`: the stated error asked for, if any.
-fn result(
-    job: &ScanJob,
-    estimate: Estimate,
-    solved: Option<Result<Vec<Row>>>,
-    target: Option<f64>,
-) -> ScanResult {
-    let missed = |rows: &[Row]| {
-        let broken = rows.iter().all(Row::is_disconnected);
-        target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
-    };
-    let (state, error, rows) = match solved {
-        Some(Ok(rows)) if missed(&rows) => (State::ErrorNotMet, None, rows.len()),
-        Some(Ok(rows)) if rows.iter().any(|row| row.converged() == Some(false)) => {
-            (State::NotConverged, None, rows.len())
-        }
-        Some(Ok(rows)) => (State::Done, None, rows.len()),
-        Some(Err(e)) => (State::Failed, Some(e.to_string()), 0),
-        None => (State::Planned, None, 0),
-    };
-    ScanResult {
-        scan: job.name.clone(),
-        input: job.input.clone(),
-        state,
-        error,
-        rows,
-        estimate,
-    }
-}
-
-fn outcome(results: &[ScanResult]) -> Outcome {
-    let in_state = |state: State| results.iter().filter(move |r| r.state == state);
-    let failed: Vec<String> = in_state(State::Failed).map(|r| r.scan.clone()).collect();
-    let short = [State::NotConverged, State::ErrorNotMet]
-        .into_iter()
-        .any(|state| in_state(state).next().is_some());
-    match (failed.is_empty(), short) {
-        (false, _) => Outcome::SomeFailed(failed),
-        (true, true) => Outcome::NotConverged,
-        (true, false) => Outcome::Done,
-    }
-}
-
-/// What would run. Every scan is read and segmented, so what its solves need is known.
-fn plan(
-    recipe: &Recipe,
-    jobs: &[ScanJob],
-    estimates: &[Estimate],
-    out: &Path,
-    session: &Session,
-) -> Vec<ScanResult> {
-    let bar = session.bar(jobs.len() as u64, "scans");
-    let mut results = Vec::new();
-    for (job, first) in jobs.iter().zip(estimates) {
-        let to = out.join(&job.name);
-        let quiet = Session {
-            quiet: true,
-            ..session.clone()
-        };
-        let known = segment::in_memory(&job.input, Some(&job.name), &job.segment, &quiet)
-            .and_then(|specimen| of_specimen(&specimen, first, recipe));
-        bar.inc(1);
-        let estimate = *known.as_ref().unwrap_or(first);
-        results.push(match &known {
-            Ok(e) => {
-                let (to, from) = (to.display(), job.input.display());
-                session.say(format!("{to} <- {from}: {e}"));
-                result(job, estimate, None, None)
-            }
-            Err(e) => {
-                session.warn(format!("{} would fail: {e}", job.name));
-                result(job, estimate, Some(Err(e.clone())), None)
-            }
-        });
-        if let Some(free) = host::available_mib().filter(|free| *free < estimate.memory_mib) {
-            session.warn(format!("{} will not fit: {free:.0} MiB are free", job.name));
-        }
-    }
-    bar.finish_and_clear();
-    let estimates: Vec<Estimate> = results.iter().map(|r| r.estimate).collect();
-    let seconds = estimates.iter().filter_map(|e| e.time_s).sum::<f64>();
-    let time = match seconds {
-        s if s < 90.0 => format!("{s:.0} s"),
-        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
-    };
-    let unknown = estimates.iter().filter(|e| e.time_s.is_none()).count();
-    let rest = match unknown {
-        0 => String::new(),
-        n => format!(", and {n} whose time is not known before reading"),
-    };
-    session.say(format!(
-        "scans: {}; about {time} one after the other{rest}",
-        jobs.len()
-    ));
-    results
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn states_are_written_in_words() {
-        let all = [
-            State::Done,
-            State::NotConverged,
-            State::ErrorNotMet,
-            State::Failed,
-            State::Planned,
-        ];
-        let words = serde_json::to_value(all).unwrap();
-        let expected = [
-            "done",
-            "not converged",
-            "error not met",
-            "failed",
-            "planned",
-        ];
-        assert_eq!(words, serde_json::json!(expected));
-    }
 }

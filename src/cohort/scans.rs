@@ -73,13 +73,62 @@ fn is_manifest(path: &Path) -> bool {
             .is_some_and(|e| e.eq_ignore_ascii_case("csv") || e.eq_ignore_ascii_case("tsv"))
 }
 
+/// Refuses a folder that holds whole scans where one scan was expected.
+///
+/// # Errors
+/// With how many it holds.
+pub fn refuse_many(input: &Path) -> Result<()> {
+    if !input.is_dir() || is_one_scan(input) {
+        return Ok(());
+    }
+    refuse_results(input)?;
+    let mut found = Vec::new();
+    descend(input, &Selection::default(), "", &mut found)?;
+    match found.first() {
+        None => Ok(()),
+        Some((_, first)) => Err(Error::file(
+            input,
+            format!("holds {} scans, where one was expected", found.len()),
+            format!(
+                "name one of them, as {}, or take them all: bonepd-ct run RECIPE {} -o OUT",
+                first.display(),
+                input.display()
+            ),
+        )),
+    }
+}
+
+/// Files that a command of this program leaves in a folder of results.
+const RESULTS: [&str; 3] = [specimen::RECORD, "results.csv", "report.html"];
+
+/// Whether a folder holds results of this program.
+fn holds_results(folder: &Path) -> bool {
+    RESULTS.iter().any(|name| folder.join(name).is_file())
+}
+
+fn refuse_results(input: &Path) -> Result<()> {
+    match input.is_dir() && holds_results(input) {
+        true => Err(Error::file(
+            input,
+            "is a folder of results, where a scan was expected",
+            "give the scan itself; `report` takes folders of results, `solve` that of a segmented scan",
+        )),
+        false => Ok(()),
+    }
+}
+
 /// Names and paths of the scans that `input` is or holds.
 fn scans_under(
     input: &Path,
     selection: &Selection,
     session: &Session,
 ) -> Result<Vec<(String, PathBuf)>> {
-    if !input.is_dir() || is_one_scan(input) {
+    let is_scan = is_one_scan(input);
+    // Results may lie beside the scans they are of.
+    if is_scan || input.join(specimen::RECORD).is_file() {
+        refuse_results(input)?;
+    }
+    if !input.is_dir() || is_scan {
         return Ok(vec![(scan::name(input), input.to_path_buf())]);
     }
     let mut found = Vec::new();
@@ -115,6 +164,25 @@ fn is_one_scan(folder: &Path) -> bool {
     !slices.is_empty() && !files.iter().any(|f| whole(&f)) && !extent::is_stack(slices[0])
 }
 
+/// Whether the pictures of a folder may be slices of one scan: of one size. Figures beside scans are of many.
+fn are_slices(folder: &Path) -> bool {
+    let Ok(files) = listing(folder) else {
+        return true;
+    };
+    let picture = |f: &PathBuf| {
+        f.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("bmp"))
+    };
+    let mut sizes = files
+        .iter()
+        .filter(|f| slices::is_slice(f) && picture(f))
+        .filter_map(|f| image::image_dimensions(f).ok());
+    match sizes.next() {
+        Some(first) => sizes.all(|size| size == first),
+        None => true,
+    }
+}
+
 fn listing(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).and_then(|entries| {
         let paths = entries.map(|entry| entry.map(|e| e.path()));
@@ -148,9 +216,12 @@ fn descend(
         let name = format!("{prefix}{}", scan::name(&path));
         let whole = path.is_file() && scan::is_scan_file(&path) && !own_files::is_result(&path);
         let single_page = slices::is_slice(&path) && !extent::is_stack(&path);
-        if whole && !single_page || path.is_dir() && is_one_scan(&path) {
+        if path.is_dir() && holds_results(&path) {
+            continue;
+        }
+        if whole && !single_page || path.is_dir() && is_one_scan(&path) && are_slices(&path) {
             found.push((name, path));
-        } else if path.is_dir() && selection.recursive && !path.join(specimen::RECORD).exists() {
+        } else if path.is_dir() && selection.recursive {
             descend(&path, selection, &format!("{name}_"), found)?;
         }
     }
@@ -159,7 +230,14 @@ fn descend(
 
 /// Names become folders beside the run's own files.
 fn refuse_names(jobs: &[ScanJob]) -> Result<()> {
-    const OWN: [&str; 4] = ["report", "results.csv", "recipe.toml", "failed.csv"];
+    const OWN: [&str; 6] = [
+        "report",
+        "results.csv",
+        "answers.csv",
+        "recipe.toml",
+        "recipe.old.toml",
+        "failed.csv",
+    ];
     let path_like = |name: &str| name.contains(['/', '\\', '\0']) || [".", ".."].contains(&name);
     for job in jobs {
         let name = job.name.as_str();
@@ -273,6 +351,56 @@ mod tests {
         std::fs::write(&manifest, "path,name\na.nii,../../home\n").unwrap();
         let words = find_names(&[manifest], &Selection::default()).unwrap_err();
         assert!(words.to_string().contains("no slashes"), "{words}");
+    }
+
+    #[test]
+    fn results_are_no_scans_and_a_folder_of_scans_is_not_one() {
+        let dir = tree(&[
+            "a.nii",
+            "b.nii",
+            "a/segment.json",
+            "a/mask.nii.gz",
+            "report/report.html",
+            "report/one.png",
+            "results.csv",
+        ]);
+        let root = dir.path().to_path_buf();
+        let deep = Selection {
+            recursive: true,
+            ..Selection::default()
+        };
+        for selection in [Selection::default(), deep] {
+            let names = find_names(std::slice::from_ref(&root), &selection);
+            assert_eq!(names.unwrap(), ["a", "b"]);
+        }
+        for results in ["a", "report"] {
+            let words = find_names(&[root.join(results)], &Selection::default());
+            let words = words.unwrap_err().to_string();
+            assert!(words.contains("folder of results"), "{words}");
+        }
+        let scans = tree(&["a.nii", "b.nii"]);
+        let words = refuse_many(scans.path()).unwrap_err().to_string();
+        assert!(words.contains("holds 2 scans"), "{words}");
+        assert!(refuse_many(&scans.path().join("a.nii")).is_ok());
+    }
+
+    #[test]
+    fn pictures_of_different_sizes_are_no_scan() {
+        let dir = tree(&["a.nii"]);
+        let figures = dir.path().join("figures");
+        std::fs::create_dir(&figures).unwrap();
+        for (name, width) in [("1.png", 4), ("2.png", 5)] {
+            image::GrayImage::new(width, 4)
+                .save(figures.join(name))
+                .unwrap();
+        }
+        let root = dir.path().to_path_buf();
+        let found = |root: &PathBuf| find_names(std::slice::from_ref(root), &Selection::default());
+        assert_eq!(found(&root).unwrap(), ["a"]);
+        image::GrayImage::new(4, 4)
+            .save(figures.join("2.png"))
+            .unwrap();
+        assert_eq!(found(&root).unwrap(), ["a", "figures"]);
     }
 
     #[test]

@@ -5,8 +5,9 @@
 //! cracks they bridge looks converged.
 
 use crate::command::estimate;
+use crate::command::in_words::in_words;
 use crate::command::ladder::{COARSENED, REFINED, smoothed_again, voxel_fe};
-use crate::command::solve::{OpenScan, in_words};
+use crate::command::solve::OpenScan;
 use crate::error::Result;
 use crate::machine::session::Session;
 use crate::pipeline::apparent::{SolveParams, of_voxels};
@@ -176,14 +177,14 @@ fn finish(
     }
     let met = meets(&rows, target);
     match best(&rows) {
-        Some((row, error)) if met => session.say(format!(
+        Some((row, error)) if met => session.result(format!(
             "error {} of {} asked for: {}",
             percent(error),
             percent(target),
             in_words(row)
         )),
         Some((row, error)) => session.warn(format!(
-            "the error asked for, {}, could not be met: the least that can be stated is {} ({})",
+            "cannot reach the error asked for, {}: the best is {} ({})",
             percent(target),
             percent(error),
             in_words(row)

@@ -50,6 +50,7 @@ impl fmt::Display for Estimate {
         }
         write!(f, "about {:.0} MiB", self.memory_mib)?;
         match self.time_s {
+            Some(t) if t < 1.0 => write!(f, ", less than 1 s"),
             Some(t) => write!(f, ", {t:.0} s"),
             None => Ok(()),
         }

@@ -123,7 +123,7 @@ pub fn lattice(
             }
             summarise(&specimen, &case, &sites)
         };
-        session.say(summary.in_words());
+        session.result(summary.in_words());
         lattices.push(summary);
     }
     if !session.dry_run {

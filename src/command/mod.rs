@@ -1,12 +1,16 @@
 //! Recipes on real scans: each verb of the program is one function here, from paths and settings to files.
 
 pub mod adaptive;
+pub mod answer;
 pub mod estimate;
+mod fields;
+pub mod in_words;
 pub mod info;
 mod ladder;
 pub mod lattice;
 pub mod phantom;
 pub mod report;
+pub mod run_settings;
 pub mod scene;
 pub mod segment;
 pub mod solve;

@@ -261,7 +261,7 @@ fn say(record: &SegmentRecord, session: &Session) {
             record.scan
         ));
     }
-    session.say(format!(
+    session.result(format!(
         "{}: {} bone voxels, BV {:.4} mm³, TV {:.4} mm³ ({}), BV/TV {:.4}; {} voxels in {} smaller pieces removed",
         record.scan,
         r.bone_voxels,
@@ -273,7 +273,7 @@ fn say(record: &SegmentRecord, session: &Session) {
         if r.removed_voxels > 0 { r.components - 1 } else { 0 },
     ));
     if let Some(t) = r.mean_thickness_mm {
-        session.say(format!(
+        session.result(format!(
             "{}: mean strut thickness about {t:.3} mm (2 BV/BS)",
             record.scan
         ));
@@ -284,7 +284,7 @@ fn say(record: &SegmentRecord, session: &Session) {
                 format!("{:.3} ± {:.3} mm", s.mean_mm, s.sd_mm)
             })
         };
-        session.say(format!(
+        session.result(format!(
             "{}: Tb.Th {}, Tb.Sp {}, Conn.D {:.2} /mm³, DA {}",
             record.scan,
             mm(&m.tb_th),

@@ -1,11 +1,11 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
+use crate::command::fields::Fields;
+use crate::command::in_words::in_words;
 use crate::command::lattice::binned;
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
-use crate::export::{inp, vti, vtk};
-use crate::format::orient;
-use crate::image::nifti;
+use crate::export::inp;
 use crate::io::atomic;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
@@ -19,6 +19,7 @@ use crate::pipeline::apparent::{Load, SolveParams, jobs};
 use crate::pipeline::lattice::LatticeParams;
 use crate::record::results::Results;
 use crate::record::specimen;
+use crate::result::cautions;
 use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
 use crate::result::ffb::with_ffb;
 use crate::result::row::{FailureLoad, Marks, Row};
@@ -42,6 +43,13 @@ pub struct OpenScan {
     strut_thickness_mm: Option<f64>,
     morphometry: Option<Morphometry>,
     image: Image,
+}
+
+/// A row with its fields, and whether it was kept from an earlier solve.
+struct Made {
+    row: Row,
+    fields: Fields,
+    is_kept: bool,
 }
 
 /// Solves every structure × lattice parameter × boundary for the specimen in `dir`. Rows already there for the same
@@ -144,19 +152,31 @@ impl OpenScan {
             session.say(note);
         }
         self.warn_of_coarse(jobs.iter().map(|(_, blank)| blank), session);
+        let height_mm = self.specimen.length_mm(params.axis);
+        if let Some((_, blank)) = jobs.first() {
+            warn_of_unusual(&blank.key, height_mm, session);
+        }
         let mut rows = Vec::new();
         for (job, blank) in &jobs {
-            let Some(mut row) = self.row(job, blank, params, session)? else {
+            let Some(Made {
+                mut row,
+                fields,
+                is_kept,
+            }) = self.row(job, blank, params, session)?
+            else {
                 continue;
             };
             mark(&mut row, self.morphometry.as_ref());
-            session.say(in_words(&row));
+            cautions::mark(&mut row, height_mm);
+            session.result(format!("{}{}", in_words(&row), said_of_kept(is_kept)));
+            // The row first: fields that cannot be written do not cost it.
             self.results.store(blank, params, &row)?;
+            fields.write(&self.dir)?;
             rows.push(row);
         }
         let all = with_extrapolated(&with_ffb(&rows));
         for row in all.iter().filter(|row| is_extrapolated(row)) {
-            session.say(in_words(row));
+            session.result(in_words(row));
         }
         Ok(all)
     }
@@ -181,7 +201,7 @@ impl OpenScan {
         blank: &Row,
         params: &SolveParams,
         session: &Session,
-    ) -> Result<Option<Row>> {
+    ) -> Result<Option<Made>> {
         let prepared = Prepared {
             specimen: &self.specimen,
             tissue: &self.tissue,
@@ -191,7 +211,11 @@ impl OpenScan {
             && (params.load != Load::Stiffness
                 || stiffness::is_current(&self.dir, params, self.results.mask_blake3()));
         if let Some(row) = self.results.find(blank, params).filter(|_| kept) {
-            return Ok(Some(row));
+            return Ok(Some(Made {
+                row,
+                fields: Fields::None,
+                is_kept: true,
+            }));
         }
         if session.dry_run {
             let mib = estimate::of_solve_mib(job, prepared, params)?;
@@ -212,7 +236,7 @@ impl OpenScan {
         blank: &Row,
         params: &SolveParams,
         session: &Session,
-    ) -> Result<Row> {
+    ) -> Result<Made> {
         let prepared = Prepared {
             specimen: &self.specimen,
             tissue: &self.tissue,
@@ -227,21 +251,25 @@ impl OpenScan {
             show(&bar, [load, loads], step, params.tolerance);
         })?;
         bar.finish_and_clear();
-        let row = match &solution {
+        let (row, fields) = match solution {
             JobResult::Modulus(solved, recorded) => {
-                write_fields(&self.dir, &blank.key, recorded)?;
-                let mut row = with_recorded(solved.row(blank.clone()), recorded);
+                let mut row = with_recorded(solved.row(blank.clone()), &recorded);
                 self.state(&mut row);
-                row
+                let stem = format!("{}-{}", name(&blank.key).replace(' ', "-"), blank.key.lp_mm);
+                (row, Fields::of(stem, recorded, specimen::axes(&self.dir)))
             }
             JobResult::Stiffness(solved) => {
                 let mask_blake3 = self.results.mask_blake3();
-                let record = stiffness::record(solved, &self.specimen, params, mask_blake3);
+                let record = stiffness::record(&solved, &self.specimen, params, mask_blake3);
                 stiffness::write(&self.dir, &record, session)?;
-                stiffness::row(solved, params, blank)
+                (stiffness::row(&solved, params, blank), Fields::None)
             }
         };
-        Ok(metered(row, &meter))
+        Ok(Made {
+            row: metered(row, &meter),
+            fields,
+            is_kept: false,
+        })
     }
 
     /// What one solve by voxel elements states of its error against the body.
@@ -277,6 +305,24 @@ impl OpenScan {
                 coarse.join(", ")
             ));
         }
+    }
+}
+
+fn said_of_kept(is_kept: bool) -> &'static str {
+    match is_kept {
+        true => "  [solved before with the same settings: kept]",
+        false => "",
+    }
+}
+
+/// What is unusual of all rows of a solve alike.
+fn warn_of_unusual(settings: &Settings, height_mm: f64, session: &Session) {
+    let row = Row {
+        key: settings.clone(),
+        ..Row::default()
+    };
+    for caution in cautions::cautions(&row, height_mm) {
+        session.warn(caution);
     }
 }
 
@@ -344,30 +390,6 @@ fn name(key: &Settings) -> String {
     }
 }
 
-/// `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView; of a lattice
-/// `fields-STRUCTURE-BOUNDARY-LP.vtk`.
-fn write_fields(dir: &Path, key: &Settings, recorded: &Recorded) -> Result<()> {
-    if let Some(fields) = &recorded.sites {
-        let name = format!("{}-{}", name(key).replace(' ', "-"), key.lp_mm);
-        vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), &name, fields)?;
-    }
-    let back = specimen::axes(dir).inverse();
-    let stored: Vec<(&str, Volume<f32>)> = recorded
-        .fields
-        .iter()
-        .map(|field| (field.name, orient::turned(field.values.clone(), &back)))
-        .collect();
-    for (name, values) in &stored {
-        let file = format!("field-{}.nii.gz", name.replace('_', "-"));
-        nifti::write(&dir.join(file), values)?;
-    }
-    let arrays: Vec<_> = stored
-        .iter()
-        .map(|(name, values)| (*name, values))
-        .collect();
-    vti::write(&dir.join("fields.vti"), &arrays)
-}
-
 /// Progress is the share of the error's decades already gained, over all loads.
 fn show(bar: &ProgressBar, [load, loads]: [usize; 2], step: CgStep, tolerance: f64) {
     if let Some(error) = step.energy_error.filter(|e| *e > 0.0) {
@@ -378,32 +400,4 @@ fn show(bar: &ProgressBar, [load, loads]: [usize; 2], step: CgStep, tolerance: f
             _ => format!("strain {} of {loads}, error {error:.1e}", load + 1),
         });
     }
-}
-
-pub(super) fn in_words(row: &Row) -> String {
-    let number = |v: Option<f64>, digits: usize| v.map_or("NA".into(), |v| format!("{v:.digits$}"));
-    let solved = row.solved.clone().unwrap_or_default();
-    let note = row
-        .marks
-        .note
-        .as_ref()
-        .map_or(String::new(), |n| format!("  ({n})"));
-    let discretization = solved
-        .discretization_error_mpa
-        .map_or(String::new(), |e| format!(" ± {e:.3} (discretisation)"));
-    let failure = solved.failure.map_or(String::new(), |failure| {
-        format!("  failure load {:.3} N", failure.load_n)
-    });
-    format!(
-        "{} {:<8} {:<12} {:>6} mm  E_app {:>9} MPa ± {:<7}{discretization} {:>9} sites {:>6} iterations {:>7} s{failure}{note}",
-        row.key.scan,
-        row.key.structure.name(),
-        row.key.boundary.map_or("", BoundaryRule::name),
-        row.key.lp_mm,
-        number(solved.e_app_mpa, 3),
-        number(solved.algebraic_error_mpa, 3),
-        solved.sites.unwrap_or(0),
-        solved.iterations.unwrap_or(0),
-        number(solved.wall_s, 2),
-    )
 }

@@ -99,17 +99,17 @@ pub fn row(solved: &Stiffness, params: &SolveParams, blank: &Row) -> Row {
 }
 
 fn say(record: &StiffnessRecord, session: &Session) {
-    session.say(format!(
+    session.result(format!(
         "{}: apparent stiffness in MPa (11, 22, 33, 23, 13, 12), {}",
         record.scan, record.boundary_conditions
     ));
     for row in &record.stiffness_mpa {
         let words: Vec<String> = row.iter().map(|c| format!("{c:>10.3}")).collect();
-        session.say(words.join(" "));
+        session.result(words.join(" "));
     }
     if let Some(o) = &record.orthotropic {
         let list = |v: &[f64; 3]| v.map(|x| format!("{x:.3}")).join(", ");
-        session.say(format!(
+        session.result(format!(
             "orthotropic: E1, E2, E3 {} MPa; G23, G13, G12 {} MPa; nu23, nu13, nu12 {}; {:.1} % of the tensor is not orthotropic",
             list(&o.young_mpa),
             list(&o.shear_mpa),

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Pixels of the longer side of a body.
 const SIDE: f64 = 420.0;
-const MARGIN: u32 = 14;
+pub(super) const MARGIN: u32 = 14;
 const BAR: u32 = 16;
 const LABELS: u32 = 110;
 const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
@@ -76,7 +76,7 @@ impl Range {
         }
     }
 
-    fn colour(&self, value: f64) -> Rgb<u8> {
+    pub(super) fn colour(&self, value: f64) -> Rgb<u8> {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         let scale = if self.low == -self.high {
             DIVERGING
@@ -115,7 +115,7 @@ pub fn draw(points: &Points, values: &[f64], range: Range, time: f64) -> RgbImag
     picture
 }
 
-fn bar(picture: &mut RgbImage, size: [u32; 2], range: Range) {
+pub(super) fn bar(picture: &mut RgbImage, size: [u32; 2], range: Range) {
     let (left, length) = (size[0] + 2 * MARGIN, size[1].max(160));
     for y in 0..length {
         let share = 1.0 - y as f64 / (length - 1) as f64;

@@ -10,8 +10,21 @@ use std::path::Path;
 const SIDE: f64 = 480.0;
 const MARGIN: u32 = 12;
 const CAPTION: u32 = 30;
-/// Orange of the Okabe–Ito palette: seen on grey by all eyes.
-const OUTLINE: Rgb<u8> = Rgb([230, 159, 0]);
+/// Vermilion of the Okabe–Ito palette: seen on grey and on white by all eyes.
+const OUTLINE: Rgb<u8> = Rgb([213, 94, 0]);
+
+/// Steps to the pixels that make a bone pixel one of the outline: two wide, so that a page that shows the picture smaller
+/// still shows it.
+const NEAR: [(i32, i32); 8] = [
+    (1, 0),
+    (-1, 0),
+    (0, 1),
+    (0, -1),
+    (2, 0),
+    (-2, 0),
+    (0, 2),
+    (0, -2),
+];
 const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
 const INK: Rgb<u8> = Rgb([30, 30, 30]);
 
@@ -119,11 +132,10 @@ fn draw_plane(
     let is_bone = |x: u32, y: u32| bone.as_slice()[voxel(x, y)] != 0;
     for y in 0..height {
         for x in 0..width {
-            let edge = is_bone(x, y)
-                && [(1, 0), (-1, 0), (0, 1), (0, -1)].iter().any(|&(dx, dy)| {
-                    let (x, y) = (x.checked_add_signed(dx), y.checked_add_signed(dy));
-                    matches!((x, y), (Some(x), Some(y)) if x < width && y < height && !is_bone(x, y))
-                });
+            let edge = is_bone(x, y) && NEAR.iter().any(|&(dx, dy)| {
+                let (x, y) = (x.checked_add_signed(dx), y.checked_add_signed(dy));
+                matches!((x, y), (Some(x), Some(y)) if x < width && y < height && !is_bone(x, y))
+            });
             let shade = ((grey.as_slice()[voxel(x, y)] - dark) / (light - dark) * 255.0) as u8;
             let colour = if edge { OUTLINE } else { Rgb([shade; 3]) };
             picture.put_pixel(left + x, top + y, colour);
@@ -249,7 +261,7 @@ mod tests {
         let picture = draw(&grey, &bone);
         // 480 pixels for 12 voxels: the bone's 4 voxels are 160 pixels, its rim 4 · 159 pixels in each panel.
         let outline = picture.pixels().filter(|p| **p == OUTLINE).count();
-        assert_eq!(outline, 3 * 4 * 159);
+        assert_eq!(outline, 3 * 4 * (159 + 157));
         assert_eq!(
             *picture.get_pixel(MARGIN + 240, MARGIN + 240),
             Rgb([255; 3])

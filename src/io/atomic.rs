@@ -28,6 +28,14 @@ pub fn create_dir(path: &Path) -> Result<()> {
 }
 
 fn unwritable(path: &Path, e: &std::io::Error) -> Error {
+    use std::io::ErrorKind::{QuotaExceeded, StorageFull};
+    if [StorageFull, QuotaExceeded].contains(&e.kind()) {
+        return Error::file(
+            path,
+            "cannot be written: the disk is full, or your quota is",
+            "free some space and give the same command again: what is finished is kept, and it goes on from there",
+        );
+    }
     Error::file(
         path,
         format!("cannot be written: {e}"),

@@ -1,10 +1,13 @@
-//! Owns what all commands share: how loud, how many threads, whether to redo or only to say what would be done.
+//! Owns what all commands share: how loud, how many threads, whether to redo or only to say what would be done; and where
+//! words go: results to stdout, everything else to stderr.
 
-use crate::machine::host;
+use crate::machine::log::Log;
+use crate::result::notes::{Alike, Alikes};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// The shared flags, as plain data, and where words go.
 #[derive(Debug, Clone, Default)]
@@ -13,6 +16,8 @@ pub struct Session {
     pub threads: Option<usize>,
     pub quiet: bool,
     pub verbose: bool,
+    /// stdout is for the JSON alone.
+    pub json: bool,
     /// Say what would be done, write nothing.
     pub dry_run: bool,
     /// Redo what is up to date.
@@ -29,7 +34,11 @@ pub struct Session {
 pub struct Output {
     /// All bars of a run share the terminal.
     bars: MultiProgress,
+    /// Of a scan of a run: bars are shown though its words go to the log.
+    bars_shown: Option<bool>,
     log: Option<Arc<Mutex<Log>>>,
+    /// Warnings of a run so far: one that says the same of another scan waits for the end.
+    warned: Option<Arc<Mutex<Alikes>>>,
 }
 
 impl Session {
@@ -39,13 +48,41 @@ impl Session {
             scan: Some(scan.to_owned()),
             quiet: self.quiet || !self.verbose,
             output: Output {
-                bars: self.output.bars.clone(),
-                log: Some(Arc::new(Mutex::new(Log {
-                    file,
-                    waiting: String::new(),
-                }))),
+                bars_shown: Some(!self.quiet),
+                log: Some(Arc::new(Mutex::new(Log::new(file)))),
+                ..self.output.clone()
             },
             ..self.clone()
+        }
+    }
+
+    /// A session that says a warning of the first scan only; [`Session::repeated_warnings`] has the others.
+    pub fn with_warnings_once(&self) -> Session {
+        Session {
+            output: Output {
+                warned: Some(Arc::default()),
+                ..self.output.clone()
+            },
+            ..self.clone()
+        }
+    }
+
+    /// Says which other scans each warning was of.
+    pub fn repeated_warnings(&self) {
+        let Some(warned) = &self.output.warned else {
+            return;
+        };
+        let warned = warned.lock().expect("no one panics while adding a line");
+        for Alike { first, scans } in warned.groups() {
+            if let [_, others @ ..] = &scans[..]
+                && !others.is_empty()
+            {
+                let names = shortened(others);
+                self.put(&format!(
+                    "warning: the same of {} more scans ({names}): {first}",
+                    others.len()
+                ));
+            }
         }
     }
 
@@ -54,6 +91,20 @@ impl Session {
         self.note(line.as_ref());
         if !self.quiet {
             self.put(line.as_ref());
+        }
+    }
+
+    /// A result: one line on stdout, also when quiet. On stderr, unless quiet, where stdout is for JSON; of a scan of a run
+    /// only in its log.
+    pub fn result(&self, line: impl AsRef<str>) {
+        self.note(line.as_ref());
+        let of_run = self.scan.is_some() && !self.verbose;
+        match self.json {
+            true if !self.quiet => self.put(line.as_ref()),
+            false if !of_run => self.output.bars.suspend(|| {
+                let _ = writeln!(std::io::stdout(), "{}", line.as_ref());
+            }),
+            _ => {}
         }
     }
 
@@ -72,9 +123,18 @@ impl Session {
 
     /// A warning about `scan`.
     pub fn warn_of(&self, scan: Option<&str>, line: impl AsRef<str>) {
+        let line = line.as_ref();
+        self.note(&format!("warning: {line}"));
+        if let (Some(warned), Some(scan)) = (&self.output.warned, scan)
+            && !self.verbose
+        {
+            let mut warned = warned.lock().expect("no one panics while adding a line");
+            if !warned.add(line, scan) {
+                return;
+            }
+        }
         let scan = scan.map_or(String::new(), |s| format!("{s}: "));
-        self.note(&format!("warning: {}", line.as_ref()));
-        self.put(&format!("warning: {scan}{}", line.as_ref()));
+        self.put(&format!("warning: {scan}{line}"));
     }
 
     /// What a user should know of how `scan` was understood.
@@ -91,78 +151,50 @@ impl Session {
 
     /// A line in the log alone.
     pub fn note(&self, line: &str) {
-        if let Some(log) = &self.output.log
-            && !self.dry_run
-        {
-            log.lock()
-                .expect("no one panics while writing a line")
-                .add(line);
-        }
+        self.logging(|log| log.add(line));
     }
 
     /// Writes what the log still holds back, making its folder.
     pub fn flush(&self) {
+        self.logging(Log::flush);
+    }
+
+    fn logging(&self, act: impl FnOnce(&mut Log)) {
         if let Some(log) = &self.output.log
             && !self.dry_run
         {
-            log.lock()
-                .expect("no one panics while writing a line")
-                .flush();
+            act(&mut log.lock().expect("no one panics while writing a line"));
         }
     }
 
-    /// A progress bar over `len` steps; hidden when quiet or when stderr is not a terminal.
+    /// A progress bar over `len` steps, shown at once and kept to one line of the terminal; hidden when quiet or when stderr is
+    /// not a terminal.
     pub fn bar(&self, len: u64, label: &str) -> ProgressBar {
-        if self.quiet || !std::io::stderr().is_terminal() {
+        let shown = self.output.bars_shown.unwrap_or(!self.quiet);
+        if !shown || !std::io::stderr().is_terminal() {
             return ProgressBar::with_draw_target(Some(len), ProgressDrawTarget::hidden());
         }
-        let style =
-            ProgressStyle::with_template("{prefix:<24} {bar:28} {pos}/{len} {msg} {elapsed}")
-                .expect("a fixed template");
-        self.output
-            .bars
-            .add(ProgressBar::new(len))
-            .with_style(style)
-            .with_prefix(label.to_owned())
+        let style = ProgressStyle::with_template(
+            "{prefix:.28} {bar:16} {percent:>3} % {elapsed_precise} {wide_msg}",
+        )
+        .expect("a fixed template");
+        let prefix = match &self.scan {
+            Some(scan) => format!("{scan} {label}"),
+            None => label.to_owned(),
+        };
+        let bar = self.output.bars.add(ProgressBar::new(len));
+        bar.set_style(style);
+        bar.set_prefix(prefix);
+        bar.tick();
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
     }
 }
 
-/// A scan's log: lines with their time, appended. Nothing is written before the scan's folder exists, so that a scan
-/// that cannot be read leaves nothing behind unless [`Session::flush`] says so.
-#[derive(Debug)]
-struct Log {
-    file: PathBuf,
-    waiting: String,
-}
-
-impl Log {
-    fn add(&mut self, line: &str) {
-        self.waiting += &format!("{} {line}\n", host::date());
-        if self.folder().is_dir() {
-            self.append();
-        }
-    }
-
-    fn flush(&mut self) {
-        let _ = std::fs::create_dir_all(self.folder());
-        self.append();
-    }
-
-    fn folder(&self) -> &Path {
-        self.file.parent().unwrap_or(Path::new("."))
-    }
-
-    /// A log that cannot be written is no reason to stop.
-    fn append(&mut self) {
-        let file = std::fs::OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&self.file);
-        if file
-            .and_then(|mut f| f.write_all(self.waiting.as_bytes()))
-            .is_ok()
-        {
-            self.waiting.clear();
-        }
+/// Names as far as one line of a terminal reads well.
+fn shortened(names: &[String]) -> String {
+    match names {
+        [first @ .., _] if names.len() > 6 => format!("{}, …", first[..5].join(", ")),
+        all => all.join(", "),
     }
 }

@@ -25,10 +25,44 @@ pub fn failures_in(out: &Path) -> Vec<Failure> {
 pub fn write_failures(out: &Path, failures: &[Failure]) -> Result<()> {
     let file = out.join(FAILED);
     match failures.is_empty() {
-        false => table::write(&file, failures),
+        false => {
+            let lines: Vec<Failure> = failures.iter().map(on_one_line).collect();
+            table::write(&file, &lines)
+        }
         true => {
             let _ = std::fs::remove_file(file);
             Ok(())
         }
+    }
+}
+
+/// Line breaks in a cell are more than many readers of tables take.
+fn on_one_line(failure: &Failure) -> Failure {
+    let lines = failure.reason.lines().map(str::trim);
+    Failure {
+        reason: lines.collect::<Vec<_>>().join("; "),
+        ..failure.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_stands_on_one_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let failure = Failure {
+            scan: "a".to_owned(),
+            input: "a.nii".to_owned(),
+            reason: "a.nii: no image\n  what to do: check it".to_owned(),
+        };
+        write_failures(dir.path(), &[failure]).unwrap();
+        let text = std::fs::read_to_string(dir.path().join(FAILED)).unwrap();
+        assert_eq!(text.lines().count(), 2, "{text}");
+        assert_eq!(
+            failures_in(dir.path())[0].reason,
+            "a.nii: no image; what to do: check it"
+        );
     }
 }

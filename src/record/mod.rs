@@ -1,6 +1,8 @@
 //! What the program keeps on disk and reads back: segmented scans, results, stiffness, states and histories of scenes.
 
+pub mod answer;
 pub mod collect_rows;
+pub mod columns;
 pub mod error_target_note;
 pub mod failures;
 pub mod history;

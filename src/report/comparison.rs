@@ -1,12 +1,10 @@
-//! Owns the figures of methods held against each other: boxes, agreement with the reference, Bland and Altman's plot.
+//! Owns the figures of methods compared with each other: distributions, agreement with the reference, Bland and Altman's plot.
 
-use super::figure::{Axis, Content, Curve, Figure, Mark, Point};
+use super::figure::{Axis, Content, Curve, Figure, GroupOfPoints, Mark, Point};
 use super::sample::Sample;
-use super::statistics::{Comparison, against_reference, groups, of_group, reference};
+use super::statistics::{Comparison, against_reference};
 use crate::result::statistics::agreement::agreement;
-
-/// Letters below an axis of boxes; more would run into each other.
-const LABELS: usize = 48;
+use crate::result::statistics::quartiles::quartiles;
 
 /// Empty for fewer than three scans.
 pub fn figures(samples: &[Sample]) -> Vec<Figure> {
@@ -14,60 +12,29 @@ pub fn figures(samples: &[Sample]) -> Vec<Figure> {
         return Vec::new();
     }
     let pairs = against_reference(samples);
-    let mut figures = vec![boxes(samples)];
+    let mut figures = vec![methods(samples)];
     figures.extend(identity(&pairs));
     figures.extend(pairs.iter().map(bland_altman));
-    figures.extend(by_group(samples));
     figures
 }
 
-fn boxes(samples: &[Sample]) -> Figure {
-    let names: Vec<String> = samples.iter().map(|s| s.method.clone()).collect();
-    let fit = names.iter().map(String::len).sum::<usize>() <= LABELS;
-    let with_n = samples.iter().enumerate().map(|(i, s)| {
-        let number = if fit {
-            String::new()
-        } else {
-            format!("{}: ", i + 1)
-        };
-        format!("{number}{} (n = {})", s.method, s.cases.len())
-    });
-    let labels = names.into_iter().enumerate().map(|(i, name)| match fit {
-        true => name,
-        false => (i + 1).to_string(),
-    });
+fn methods(samples: &[Sample]) -> Figure {
+    let group = |s: &Sample| GroupOfPoints {
+        label: format!("{} (n = {})", s.method, s.cases.len()),
+        hue: s.model as usize,
+        values: s.e_app_mpa(),
+        mean: None,
+        median: quartiles(&s.e_app_mpa()).map(|q| q.median),
+    };
     Figure {
         stem: "methods".to_owned(),
-        scan: None,
+        folded: true,
         title: "Apparent modulus by method".to_owned(),
-        caption: format!(
-            "Scans at their finest lattice parameter: {}. Box: quartiles; whiskers: 1.5 interquartile ranges; points: scans.",
-            with_n.collect::<Vec<_>>().join("; ")
-        ),
-        x: Axis::linear(""),
+        caption: "Points: scans, each at its finest lattice parameter; line: median.".to_owned(),
         y: Axis::linear("apparent modulus (MPa)"),
-        content: Content::Boxes(labels.zip(samples.iter().map(Sample::e_app_mpa)).collect()),
+        content: Content::Groups(samples.iter().map(group).collect()),
+        ..Figure::default()
     }
-}
-
-/// Boxes of the most trusted method by group, where a manifest gave groups.
-fn by_group(samples: &[Sample]) -> Option<Figure> {
-    let sample = reference(samples)?;
-    let names = groups(sample);
-    (names.len() > 1).then(|| Figure {
-        stem: "groups".to_owned(),
-        scan: None,
-        title: format!("Apparent modulus ({}) by group", sample.method),
-        caption: "Box: quartiles; whiskers: 1.5 interquartile ranges; points: scans.".to_owned(),
-        x: Axis::linear(""),
-        y: Axis::linear("apparent modulus (MPa)"),
-        content: Content::Boxes(
-            names
-                .into_iter()
-                .map(|g| (g.clone(), of_group(sample, g)))
-                .collect(),
-        ),
-    })
 }
 
 /// Moduli of all methods over those of the reference. None without comparisons.
@@ -98,12 +65,13 @@ fn identity(pairs: &[Comparison]) -> Option<Figure> {
     });
     Some(Figure {
         stem: "agreement".to_owned(),
-        scan: None,
+        folded: true,
         title: format!("Methods against {reference}"),
         caption: "One point per scan that has both; on the dashed line methods agree.".to_owned(),
         x: Axis::linear(&format!("apparent modulus, {reference} (MPa)")),
         y: Axis::linear("apparent modulus (MPa)"),
         content: Content::Curves(curves),
+        ..Figure::default()
     })
 }
 
@@ -144,7 +112,7 @@ fn bland_altman(c: &Comparison) -> Figure {
             "bland-altman-{}",
             method.to_lowercase().replace(", ", "-").replace(' ', "-")
         ),
-        scan: None,
+        folded: true,
         title: format!("{method} against {reference}"),
         caption: format!(
             "{method} less {reference} over the mean of both (Bland and Altman), {n} scans, with the mean difference and its limits of agreement."
@@ -152,6 +120,7 @@ fn bland_altman(c: &Comparison) -> Figure {
         x: Axis::linear("mean of both (MPa)"),
         y: Axis::linear("difference (MPa)"),
         content: Content::Curves(curves),
+        ..Figure::default()
     }
 }
 
@@ -174,7 +143,7 @@ mod tests {
     #[test]
     fn a_mean_has_no_figure_against_its_parts() {
         assert_eq!(of(&cohort(2)), []);
-        assert_eq!(stems(&of(&cohort(4))), ["methods", "groups"]);
+        assert_eq!(stems(&of(&cohort(4))), ["methods"]);
     }
 
     #[test]
@@ -192,24 +161,20 @@ mod tests {
             "bland-altman-firm",
             "bland-altman-ffb-mean",
             "bland-altman-graded-extrapolated",
-            "groups",
         ];
         assert_eq!(stems(&figures), expected);
-        assert!(
-            figures[0]
-                .caption
-                .contains("4: graded, extrapolated (n = 4)")
-        );
-        let bv_tv = super::super::curves::against_bv_tv(&rows).unwrap();
-        let Content::Curves(curves) = bv_tv.content else {
+        let Content::Groups(groups) = &figures[0].content else {
+            panic!("methods are side by side");
+        };
+        assert_eq!(groups[3].label, "graded, extrapolated (n = 4)");
+        let Content::Curves(curves) = &figures[1].content else {
             panic!("curves are curves");
         };
         let look = |name: &str| {
             let found = curves.iter().find(|c| c.name == name);
             found.map(|c| (c.hue % 7, c.shape % 7))
         };
-        let [graded, fe] =
-            ["graded, extrapolated", "voxel FE, extrapolated"].map(|n| look(n).unwrap());
-        assert!(graded.0 != fe.0 && graded.1 != fe.1, "{graded:?} {fe:?}");
+        let [graded, ffb] = ["graded, extrapolated", "FFB mean"].map(|n| look(n).unwrap());
+        assert!(graded.0 != ffb.0 && graded.1 != ffb.1, "{graded:?} {ffb:?}");
     }
 }

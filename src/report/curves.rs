@@ -3,9 +3,9 @@
 use super::figure::{Axis, Content, Curve, Figure, Mark, Point};
 use super::table::{condition, varying_settings};
 use super::{Model, distinct};
+use crate::result::condition::Condition;
 use crate::result::row::Row;
 use crate::result::settings::CellType;
-use crate::result::statistics::regression::regression;
 use std::collections::HashSet;
 
 /// Curves of one colour and marker: one structure, one model, one set of settings.
@@ -135,117 +135,64 @@ fn convergence_of(scan: &str, solved: &[SolvedRow]) -> Figure {
         stem: format!("convergence-{}", file_name(scan)),
         scan: Some(scan.to_owned()),
         title: format!("Convergence of {scan}"),
-        caption: "Apparent modulus against lattice parameter (element size for voxel FE). Bars: stated error.".to_owned(),
+        caption: format!(
+            "Apparent modulus against lattice parameter (element size for voxel FE). Bars: all of the stated error; level lines: limits.{}",
+            tissue(&found)
+        ),
         x: Axis::linear("lattice parameter (mm)"),
         y: Axis::linear("apparent modulus (MPa)"),
         content: Content::Curves(curves_),
+        ..Figure::default()
     }
 }
 
-/// The stated algebraic and discretisation errors together, where there are any.
+/// The tissue in a sentence, where all rows have one.
+fn tissue(found: &[SolvedRow]) -> String {
+    let all = distinct(
+        found
+            .iter()
+            .map(|s| Condition::of(&s.row.key).tissue_in_words()),
+    );
+    match &all[..] {
+        [one] => format!(" {one}"),
+        _ => String::new(),
+    }
+}
+
+/// With all that is stated of its error, where the resolution's is.
 fn with_error(s: &SolvedRow) -> Point {
-    let errors = s.row.stated_errors_mpa();
-    let stated = errors.iter().flatten().count() > 0;
-    let error: f64 = errors.iter().flatten().map(|e| e.abs()).sum();
     Point {
         x: s.row.key.lp_mm,
         y: s.e_app_mpa,
-        y_error: stated.then_some([error, error]),
+        y_error: s.row.error_mpa().map(|e| [e, e]),
     }
 }
 
-/// E_app of each scan's finest solve against its BV/TV, with the least-squares line of each method over three scans or
-/// more. None for fewer than two scans.
-pub fn against_bv_tv(rows: &[Row]) -> Option<Figure> {
-    let mut solved = solved(rows);
-    solved.retain(|s| s.row.converged() != Some(false));
-    if distinct(solved.iter().map(|s| &s.row.key.scan)).len() < 2 {
-        return None;
-    }
-    let mut curves = curves(&solved, Mark::Points, |members| {
-        finest(members)
-            .iter()
-            .map(|s| Point::new(s.row.key.bv_tv, s.e_app_mpa))
-            .collect()
-    });
-    let lines: Vec<Curve> = curves.iter().filter_map(least_squares).collect();
-    curves.extend(lines);
-    Some(Figure {
-        stem: "bv-tv".to_owned(),
-        scan: None,
-        title: "Stiffness and bone volume fraction".to_owned(),
-        caption: "Apparent modulus of each scan at its finest lattice parameter against BV/TV, with least-squares lines."
-            .to_owned(),
-        x: Axis::linear("BV/TV"),
-        y: Axis::linear("apparent modulus (MPa)"),
-        content: Content::Curves(curves),
-    })
-}
-
-/// A line without a name: its colour says whose it is.
-fn least_squares(curve: &Curve) -> Option<Curve> {
-    let (x, y): (Vec<f64>, Vec<f64>) = curve.points.iter().map(|p| (p.x, p.y)).unzip();
-    let fit = regression(&x, &y)?;
-    let [low, high] = [f64::min, f64::max].map(|f| x.iter().copied().reduce(f).unwrap_or(0.0));
-    let at = |x: f64| Point::new(x, fit.intercept + fit.slope * x);
-    Some(Curve {
-        name: String::new(),
-        mark: Mark::Rule,
-        points: vec![at(low), at(high)],
-        ..curve.clone()
-    })
-}
-
-/// Of each scan the member with the smallest lattice parameter.
-fn finest<'a, 'b>(members: &[&'b SolvedRow<'a>]) -> Vec<&'b SolvedRow<'a>> {
-    let scans = distinct(members.iter().map(|s| &s.row.key.scan));
-    let of = |scan| {
-        let own = members.iter().filter(|s| &s.row.key.scan == scan);
-        own.min_by(|a, b| a.row.key.lp_mm.total_cmp(&b.row.key.lp_mm))
-            .copied()
-    };
-    scans.into_iter().filter_map(of).collect()
-}
-
-/// Wall time against lattice parameter: the median over scans, bars from the fastest to the slowest.
+/// Wall time of each solve against its size; None for fewer than three solves.
 pub fn wall_time(rows: &[Row]) -> Option<Figure> {
-    let mut solved = solved(rows);
-    solved.retain(|s| {
-        s.row.solved.as_ref().is_some_and(|r| r.sites != Some(0))
-            && s.family.model != Model::Ffb
-            && s.row.wall_s().is_some_and(|t| t > 0.0)
+    let solved = solved(rows);
+    let place = |s: &SolvedRow| {
+        let own = s.row.solved.as_ref().filter(|_| !s.row.key.is_derived())?;
+        let unknowns = own.unknowns.filter(|n| *n > 0)?;
+        Some(Point::new(
+            unknowns as f64,
+            own.wall_s.filter(|t| *t > 0.0)?,
+        ))
+    };
+    let curves = curves(&solved, Mark::Points, |members| {
+        members.iter().filter_map(|s| place(s)).collect()
     });
-    let curves = curves(&solved, Mark::Joined, |members| {
-        let mut sizes = distinct(members.iter().map(|s| s.row.key.lp_mm));
-        sizes.sort_by(f64::total_cmp);
-        let at = |lp: f64| {
-            let same = members.iter().filter(|s| s.row.key.lp_mm == lp);
-            median_with_range(lp, same.filter_map(|s| s.row.wall_s()).collect())
-        };
-        sizes.into_iter().map(at).collect()
-    });
-    (!curves.is_empty()).then(|| Figure {
+    let points: usize = curves.iter().map(|c| c.points.len()).sum();
+    (points > 2).then(|| Figure {
         stem: "wall-time".to_owned(),
-        scan: None,
+        folded: true,
         title: "Time of a solve".to_owned(),
-        caption: "Wall time of one solve against lattice parameter (element size for voxel FE): median over scans; \
-                  bars reach from the fastest to the slowest."
-            .to_owned(),
-        x: Axis::linear("lattice parameter (mm)"),
+        caption: "Wall time of each solve against its degrees of freedom.".to_owned(),
+        x: Axis::log("degrees of freedom"),
         y: Axis::log("wall time (s)"),
         content: Content::Curves(curves),
+        ..Figure::default()
     })
-}
-
-fn median_with_range(x: f64, mut values: Vec<f64>) -> Point {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    let median = 0.5 * (values[(n - 1) / 2] + values[n / 2]);
-    Point {
-        x,
-        y: median,
-        y_error: (n > 1).then(|| [median - values[0], values[n - 1] - median]),
-    }
 }
 
 /// Error against wall time, for scans with a reference: the extrapolated voxel-FE modulus, else the finest voxel FE.
@@ -275,7 +222,7 @@ pub fn speed_error(rows: &[Row]) -> Option<Figure> {
     });
     (!curves.is_empty()).then(|| Figure {
         stem: "speed-error".to_owned(),
-        scan: None,
+        folded: true,
         title: "Speed and error".to_owned(),
         caption: "Deviation from the reference against wall time, one point per solve. Reference: the extrapolated \
                   voxel-FE modulus of the scan, or its finest voxel FE."
@@ -283,6 +230,7 @@ pub fn speed_error(rows: &[Row]) -> Option<Figure> {
         x: Axis::log("wall time (s)"),
         y: Axis::log("deviation from reference (%)"),
         content: Content::Curves(curves),
+        ..Figure::default()
     })
 }
 

@@ -1,13 +1,15 @@
-//! Owns what a figure shows, as plain data: axes, curves, boxes. How it is drawn is not its business.
+//! Owns what a figure shows, as plain data: axes, curves, groups of points. How it is drawn is not its business.
 
 use serde::Serialize;
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Figure {
     /// Name of the file without extension; unique in a report.
     pub stem: String,
     /// The one scan it is about; None: all.
     pub scan: Option<String>,
+    /// Of methods and times rather than of bone: behind a fold of the page.
+    pub folded: bool,
     pub title: String,
     /// What one sees, in a sentence or two.
     pub caption: String,
@@ -16,24 +18,26 @@ pub struct Figure {
     pub content: Content,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Axis {
     pub label: String,
     pub log: bool,
+    /// Words in place of the numbers 1, 2, 3, …
+    pub categories: Vec<String>,
 }
 
 impl Axis {
     pub fn linear(label: &str) -> Axis {
         Axis {
             label: label.to_owned(),
-            log: false,
+            ..Axis::default()
         }
     }
 
     pub fn log(label: &str) -> Axis {
         Axis {
-            label: label.to_owned(),
             log: true,
+            ..Axis::linear(label)
         }
     }
 }
@@ -41,8 +45,25 @@ impl Axis {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Content {
     Curves(Vec<Curve>),
-    /// Label and values of each box.
-    Boxes(Vec<(String, Vec<f64>)>),
+    /// Side by side, each at its label.
+    Groups(Vec<GroupOfPoints>),
+}
+
+impl Default for Content {
+    fn default() -> Self {
+        Content::Curves(Vec::new())
+    }
+}
+
+/// Values of one group, with what describes them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GroupOfPoints {
+    pub label: String,
+    pub hue: usize,
+    pub values: Vec<f64>,
+    /// Mean, and the ends of its interval.
+    pub mean: Option<[f64; 3]>,
+    pub median: Option<f64>,
 }
 
 /// A named series of points. Curves of one hue have one colour, of one shape one marker and dash, in every figure.

@@ -1,10 +1,11 @@
 //! Owns the report as one HTML file that needs nothing else: styles, figures, pictures and the sorting of tables inside.
 
 use crate::error::{Error, Result};
+use crate::report::answers;
+use crate::report::cells::{Cell, Table, length, link, number, records, text, with_error};
 use crate::report::figure::Figure;
-use crate::report::markdown::digits;
+use crate::report::group_tables;
 use crate::report::plot;
-use crate::report::table::Line;
 use crate::report::{Model, Report};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -16,10 +17,22 @@ use serde::Serialize;
 #[derive(Debug, Clone, Default)]
 pub struct ScanPage {
     pub scan: String,
-    /// `segment.png`: mid-slices with the mask's outline.
-    pub picture: Option<Vec<u8>>,
+    /// Pictures as PNG, each with its caption: `segment.png`, fields.
+    pub pictures: Vec<(String, Vec<u8>)>,
     /// Key and value: what is known of the input, the segmentation, the solve.
     pub facts: Vec<(String, String)>,
+    /// Apparent stiffness, where it was asked for: conditions in words, matrix, constants.
+    pub stiffness: Option<ShownStiffness>,
+    /// Files of fields, curves and models in the scan's folder.
+    pub files: Vec<String>,
+}
+
+/// The apparent stiffness of a scan.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ShownStiffness {
+    pub conditions: String,
+    pub matrix: Table,
+    pub constants: Table,
 }
 
 /// Where a report comes from.
@@ -32,26 +45,6 @@ pub struct Source {
     pub host: String,
 }
 
-/// A table as the page shows it; numbers are sorted as numbers.
-#[derive(Serialize)]
-struct Table {
-    head: Vec<String>,
-    body: Vec<Vec<Cell>>,
-}
-
-#[derive(Serialize)]
-struct Cell {
-    text: String,
-    /// To sort by, where the text is a number.
-    key: Option<f64>,
-    /// Name of the scan whose page it leads to.
-    link: Option<String>,
-    /// Shown on pointing at it.
-    hint: Option<String>,
-    /// A number that is not there.
-    missing: bool,
-}
-
 #[derive(Serialize)]
 struct Shown<'a> {
     title: &'a str,
@@ -62,9 +55,17 @@ struct Shown<'a> {
 #[derive(Serialize)]
 struct Page<'a> {
     scan: &'a str,
-    picture: Option<String>,
+    pictures: Vec<Picture<'a>>,
     facts: &'a [(String, String)],
+    stiffness: &'a Option<ShownStiffness>,
+    files: &'a [String],
     figures: Vec<Shown<'a>>,
+}
+
+#[derive(Serialize)]
+struct Picture<'a> {
+    caption: &'a str,
+    base64: String,
 }
 
 /// The whole page.
@@ -72,7 +73,11 @@ pub fn render(report: &Report, pages: &[ScanPage], source: &Source) -> Result<St
     let (own, shared): (Vec<&Figure>, Vec<&Figure>) =
         report.figures.iter().partition(|f| f.scan.is_some());
     let pages: Vec<Page> = pages.iter().map(|page| shown_page(page, &own)).collect();
-    let figures: Vec<Shown> = shared.into_iter().map(shown).collect();
+    let (folded, figures): (Vec<&Figure>, Vec<&Figure>) =
+        shared.into_iter().partition(|f| f.folded);
+    let shown_all = |figures: Vec<&Figure>| -> Vec<Value> {
+        figures.into_iter().map(|f| plain(&shown(f))).collect()
+    };
     let statistics = &report.statistics;
     let page = context! {
         title => &report.title,
@@ -80,13 +85,19 @@ pub fn render(report: &Report, pages: &[ScanPage], source: &Source) -> Result<St
         date => &source.date,
         host => &source.host,
         recipe => &source.recipe,
+        conditions => &report.answers.conditions,
         notes => &report.notes,
-        e_app => plain(&e_app(report)),
+        answers => plain(&answers::table(&report.answers)),
+        groups => plain(&group_tables::lines_table(&report.groups)),
+        comparisons => plain(&group_tables::comparisons_table(&report.groups)),
+        on_errors => group_tables::ON_ERRORS,
+        figures => shown_all(figures),
+        solves => plain(&solves(report)),
+        method_notes => &report.method_notes,
+        method_figures => shown_all(folded),
         regressions => plain(&records(&statistics.regressions)),
         agreements => plain(&records(&statistics.agreements)),
         boxes => plain(&records(&statistics.boxes)),
-        anova => plain(&statistics.anova),
-        figures => plain(&figures),
         pages => plain(&pages),
     };
     let mut environment = Environment::new();
@@ -111,8 +122,17 @@ fn shown_page<'a>(page: &'a ScanPage, figures: &[&'a Figure]) -> Page<'a> {
         .filter(|f| f.scan.as_deref() == Some(&page.scan));
     Page {
         scan: &page.scan,
-        picture: page.picture.as_ref().map(|png| STANDARD.encode(png)),
+        pictures: page
+            .pictures
+            .iter()
+            .map(|(caption, png)| Picture {
+                caption,
+                base64: STANDARD.encode(png),
+            })
+            .collect(),
         facts: &page.facts,
+        stiffness: &page.stiffness,
+        files: &page.files,
         figures: own.map(|f| shown(f)).collect(),
     }
 }
@@ -140,182 +160,47 @@ fn scalable(svg: &str) -> String {
     }
 }
 
-fn e_app(report: &Report) -> Table {
+/// All solves, one line per scan, structure and lattice parameter.
+pub(super) fn solves(report: &Report) -> Table {
     let models: Vec<Model> = Model::ALL
         .into_iter()
         .filter(|m| report.lines.iter().any(|line| line.modulus(*m).is_some()))
         .collect();
-    let mut head: Vec<String> = ["scan", "structure", "LP (mm)", "condition", "BV/TV"]
-        .map(str::to_owned)
-        .into();
-    head.extend(models.iter().map(|m| format!("{} (MPa)", m.name())));
-    head.push("time (s)".to_owned());
-    let finest = report.lines.iter().map(|line| decimals(line.lp_mm)).max();
-    let lp = |v: f64| format!("{v:.*}", finest.unwrap_or(0).min(6));
+    let mut head = ["scan", "structure", "LP (mm)", "condition", "BV/TV"].to_vec();
+    let names: Vec<String> = models
+        .iter()
+        .map(|m| format!("{} (MPa)", m.name()))
+        .collect();
+    head.extend(names.iter().map(String::as_str));
+    head.push("time (s)");
     let body = report.lines.iter().map(|line| {
-        let mut cells = vec![
-            Cell {
-                link: Some(line.scan.clone()),
-                ..text(&line.scan)
-            },
+        let mut cells: Vec<Cell> = vec![
+            link(&line.scan),
             text(&line.structure.name().to_uppercase()),
-            Cell {
-                text: lp(line.lp_mm),
-                ..number(Some(line.lp_mm))
-            },
+            length(line.lp_mm),
             text(line.condition.as_deref().unwrap_or("")),
             number(Some(line.bv_tv)),
         ];
-        cells.extend(models.iter().map(|m| modulus(line, *m)));
-        cells.push(number(line.wall_s));
+        let modulus = |m: &Model| {
+            let [algebraic, discretisation] = line.stated_errors(*m);
+            let all = discretisation.map(|d| d.abs() + algebraic.unwrap_or(0.0).abs());
+            with_error(line.modulus(*m), all)
+        };
+        cells.extend(models.iter().map(modulus));
+        cells.push(number(line.wall_s.map(|t| (t * 100.0).round() / 100.0)));
         cells
     });
-    Table {
-        body: body.collect(),
-        head,
-    }
-    .without_empty_columns()
-}
-
-/// A modulus with its stated error; what the error is made of shows on pointing at it.
-fn modulus(line: &Line, model: Model) -> Cell {
-    let plain = number(line.modulus(model));
-    let stated = line.stated_errors(model);
-    if plain.key.is_none() || stated.iter().all(Option::is_none) {
-        return plain;
-    }
-    let total: f64 = stated.iter().flatten().map(|e| e.abs()).sum();
-    let part =
-        |name: &str, error: Option<f64>| Some(format!("{name} {} MPa", digits(Some(error?))));
-    let parts = [
-        part("algebraic error", stated[0]),
-        part("discretisation error", stated[1]),
-    ];
-    Cell {
-        text: format!("{} ± {}", plain.text, short(total)),
-        hint: Some(parts.into_iter().flatten().collect::<Vec<_>>().join(", ")),
-        ..plain
-    }
-}
-
-/// An error in two digits.
-fn short(error: f64) -> String {
-    match error {
-        e if e <= 0.0 || !e.is_finite() => e.to_string(),
-        e => format!(
-            "{e:.*}",
-            (1 - e.log10().floor() as i32).clamp(0, 6) as usize
-        ),
-    }
-}
-
-/// Decimals of a length as it was given, at most nanometres.
-fn decimals(mm: f64) -> usize {
-    let text = mm.to_string();
-    text.split_once('.').map_or(0, |(_, after)| after.len())
-}
-
-impl Table {
-    fn without_empty_columns(mut self) -> Table {
-        for column in (0..self.head.len()).rev() {
-            let empty = |cell: &Cell| cell.text.is_empty() || cell.missing;
-            if self.body.iter().all(|row| empty(&row[column])) {
-                self.head.remove(column);
-                self.body.iter_mut().for_each(|row| {
-                    row.remove(column);
-                });
-            }
-        }
-        self
-    }
-}
-
-/// Plain records as a table; heads are the fields' names.
-fn records<T: Serialize>(records: &[T]) -> Table {
-    let rows: Vec<serde_json::Map<String, serde_json::Value>> = records
-        .iter()
-        .filter_map(|record| serde_json::to_value(record).ok()?.as_object().cloned())
-        .collect();
-    let head = rows.first().map_or(Vec::new(), |row| {
-        row.keys().map(|key| head_of(key)).collect()
-    });
-    let cell = |value: &serde_json::Value| match (value.as_u64(), value.as_f64(), value.as_str()) {
-        (Some(n), _, _) => Cell {
-            text: n.to_string(),
-            ..number(Some(n as f64))
-        },
-        (_, Some(v), _) => number(Some(v)),
-        (_, _, word) => text(word.unwrap_or("")),
-    };
-    let body = rows
-        .iter()
-        .map(|row| row.values().map(cell).collect())
-        .collect();
-    Table { head, body }.without_empty_columns()
-}
-
-/// A field's name as people write it.
-fn head_of(field: &str) -> String {
-    let known = match field {
-        "r2" => "R²",
-        "q1" => "first quartile",
-        "q3" => "third quartile",
-        "sd" => "SD",
-        "slope_p" => "p of slope",
-        "intercept_p" => "p of intercept",
-        "bias_p" => "p of bias",
-        "slope_standard_error" => "SE of slope",
-        "intercept_standard_error" => "SE of intercept",
-        other => return other.replace('_', " "),
-    };
-    known.to_owned()
-}
-
-fn text(words: &str) -> Cell {
-    Cell {
-        text: words.to_owned(),
-        key: None,
-        link: None,
-        hint: None,
-        missing: false,
-    }
-}
-
-fn number(value: Option<f64>) -> Cell {
-    let small = value.filter(|v| *v != 0.0 && v.abs() < 1e-4);
-    let text = match value {
-        Some(_) => small.map_or_else(|| digits(value), |v| format!("{v:.2e}")),
-        None => "–".to_owned(),
-    };
-    Cell {
-        text,
-        key: value,
-        link: None,
-        hint: None,
-        missing: value.is_none(),
-    }
+    Table::new(&head, body.collect()).without_empty_columns()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn an_error_is_said_in_two_digits() {
-        for (error, words) in [
-            (0.0, "0"),
-            (0.01234, "0.012"),
-            (1.96, "2.0"),
-            (123.4, "123"),
-        ] {
-            assert_eq!(short(error), words);
-        }
-    }
-
     /// A reader of the page has no repository.
     #[test]
     fn a_page_is_about_its_scans_alone() {
-        let report = crate::report::report(&[], &Default::default());
+        let report = crate::report::report(&[], Default::default(), &Default::default());
         let page = render(&report, &[], &Source::default()).unwrap();
         assert!(page.contains("Recipe and provenance"));
         for words in ["cargo ", "reports/", "Validation"] {

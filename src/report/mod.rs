@@ -1,9 +1,14 @@
 //! Owns the report: rows of solved scans in; tables, figures and notes out, as plain data.
 
+pub mod answers;
+pub mod cells;
+mod group_tables;
+pub mod groups;
 pub mod html;
 pub mod markdown;
 pub mod plot;
 
+mod answer_figures;
 mod comparison;
 mod curves;
 pub mod figure;
@@ -11,9 +16,13 @@ mod sample;
 pub mod statistics;
 pub mod table;
 
+use crate::result::cautions::WARNING;
+use crate::result::notes::{Alike, Alikes};
 use crate::result::row::Row;
 use crate::result::settings::{BoundaryRule, Method};
+use answers::Answers;
 use figure::Figure;
+use groups::Groups;
 use serde::{Deserialize, Serialize};
 use statistics::Statistics;
 use table::Line;
@@ -38,39 +47,97 @@ impl Default for ReportParams {
 pub struct Report {
     pub title: String,
     pub rows: Vec<Row>,
-    /// One line per scan, structure and lattice parameter: the E_app table.
+    /// One line a scan.
+    pub answers: Answers,
+    pub groups: Groups,
+    /// One line per scan, structure and lattice parameter: all solves.
     pub lines: Vec<Line>,
+    /// Of methods against each other.
     pub statistics: Statistics,
     pub figures: Vec<Figure>,
-    /// What a reader must know of single rows, and which of them statistics leave out.
+    /// What a reader must know of the answers: one line a matter.
     pub notes: Vec<String>,
+    /// What is of interest to those who compare methods: single rows, what statistics leave out.
+    pub method_notes: Vec<String>,
 }
 
-/// Tables and figures of `rows`, in their order.
-pub fn report(rows: &[Row], params: &ReportParams) -> Report {
-    let mut figures = curves::convergence(rows);
-    figures.extend(curves::against_bv_tv(rows));
+/// Tables and figures of `rows`, in their order, and of their answers.
+pub fn report(rows: &[Row], answers: Answers, params: &ReportParams) -> Report {
+    let mut figures = answer_figures::figures(&answers);
+    figures.extend(curves::convergence(rows));
     figures.extend(curves::wall_time(rows));
     figures.extend(curves::speed_error(rows));
     let (samples, left_out) = sample::samples(rows);
     figures.extend(comparison::figures(&samples));
     curves::with_own_files(&mut figures);
     let statistics = statistics::statistics(&samples);
-    let mut notes = notes(rows);
-    notes.extend(left_out);
-    notes.extend(statistics.analysis_of_variance());
+    let (kept, no_load) = answers::comparable(&answers);
+    let groups = groups::groups(&kept);
+    let mut notes = warnings(rows, &answers);
+    notes.extend(answers.left_out.iter().cloned());
+    notes.extend(no_load);
+    notes.extend(groups.notes.iter().cloned());
+    let mut method_notes = row_notes(rows);
+    method_notes.extend(left_out);
+    method_notes.extend(statistics.analysis_of_variance());
     Report {
         title: params.title.clone(),
         rows: rows.to_vec(),
         lines: table::lines(rows),
+        answers,
+        groups,
         statistics,
         figures,
         notes,
+        method_notes,
+    }
+}
+
+/// How notes begin that a reader must see; others say how a number was found.
+const SERIOUS: [&str; 6] = [
+    WARNING,
+    "not converged",
+    "mean of a modulus",
+    "no path",
+    "what connects",
+    "the error asked for",
+];
+
+/// Warnings of the answers' notes and of all rows, one line a matter, with the scans that they are of.
+fn warnings(rows: &[Row], answers: &Answers) -> Vec<String> {
+    let mut found = Alikes::default();
+    let mut add = |note: Option<&str>, scan: &str| {
+        let parts = note.unwrap_or_default().split("; ");
+        for part in parts.filter(|p| SERIOUS.iter().any(|s| p.starts_with(s))) {
+            found.add(part.strip_prefix(WARNING).unwrap_or(part), scan);
+        }
+    };
+    for line in &answers.lines {
+        add(line.note.as_deref(), &line.scan);
+    }
+    for row in rows {
+        add(row.marks.note.as_deref(), &row.key.scan);
+    }
+    let all = answers.lines.len();
+    found.groups().map(|group| in_words(group, all)).collect()
+}
+
+/// A matter, of one scan, of some or of all.
+fn in_words(group: &Alike, all: usize) -> String {
+    match &group.scans[..] {
+        [one] => format!("{one}: {}", group.first),
+        scans => format!(
+            "{} of {all} scans ({}): {} (numbers of {})",
+            scans.len(),
+            scans.join(", "),
+            group.first,
+            scans[0]
+        ),
     }
 }
 
 /// One note per scan and matter, with the rows it is about.
-fn notes(rows: &[Row]) -> Vec<String> {
+fn row_notes(rows: &[Row]) -> Vec<String> {
     let found: Vec<(&str, String, String)> = rows.iter().filter_map(note).collect();
     let matters = distinct(found.iter().map(|(scan, words, _)| (*scan, words)));
     let one = |(scan, words): (&str, &String)| {
@@ -172,8 +239,14 @@ fn distinct<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
 mod tests {
     use super::*;
     use crate::grid::Axis;
+    use crate::result::answer::ScanFacts;
     use crate::result::row::Solution;
     use crate::result::settings::{CellType, Settings};
+
+    fn report_of(rows: &[Row]) -> Report {
+        let answers = answers::answers(rows, |_| ScanFacts::default());
+        report(rows, answers, &ReportParams::default())
+    }
 
     fn row(scan: &str, boundary: BoundaryRule, lp_mm: f64, e: f64) -> Row {
         Row {
@@ -202,7 +275,7 @@ mod tests {
             row("a", BoundaryRule::Ffb, 0.1, 60.0),
             row("a", BoundaryRule::FLOPPY, 0.2, 20.0),
         ];
-        let report = report(&rows, &ReportParams::default());
+        let report = report_of(&rows);
         assert_eq!(report.lines.len(), 2);
         let line = &report.lines[0];
         assert_eq!(
@@ -231,15 +304,39 @@ mod tests {
     fn a_row_that_is_not_converged_is_noted() {
         let mut stalled = row("a", BoundaryRule::FLOPPY, 0.1, 30.0);
         stalled.solved.as_mut().unwrap().converged = Some(false);
-        let report = report(&[stalled], &ReportParams::default());
-        assert_eq!(report.notes, ["a: not converged (SC floppy 0.1 mm)"]);
+        let report = report_of(&[stalled]);
+        assert_eq!(report.notes, ["a: not converged"]);
+        assert_eq!(report.method_notes, ["a: not converged (SC floppy 0.1 mm)"]);
+    }
+
+    #[test]
+    fn a_warning_of_many_scans_is_one_line() {
+        let rows: Vec<Row> = ["a", "b"]
+            .iter()
+            .flat_map(|scan| [0.1, 0.2].map(|lp| row(scan, BoundaryRule::FLOPPY, lp, 30.0)))
+            .map(|mut row| {
+                row.marks.mean_thickness_mm = Some(0.05 * (1.0 + row.key.lp_mm));
+                crate::result::cautions::mark(&mut row, 5.0);
+                row
+            })
+            .collect();
+        let found: Vec<String> = report_of(&rows)
+            .notes
+            .into_iter()
+            .filter(|note| note.contains("far from converged"))
+            .collect();
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(
+            found[0].starts_with("2 of 2 scans (a, b): the lattice parameter"),
+            "{found:?}"
+        );
     }
 
     #[test]
     fn scans_of_like_names_have_figures_of_their_own() {
         let names = ["scan 1", "scan_1", "SCAN_1", "scan_1-2"];
         let rows = names.map(|name| row(name, BoundaryRule::FLOPPY, 0.1, 30.0));
-        let report = report(&rows, &ReportParams::default());
+        let report = report_of(&rows);
         let mut stems: Vec<String> = report
             .figures
             .iter()
@@ -254,7 +351,7 @@ mod tests {
     #[test]
     fn figures_come_only_where_there_is_something_to_show() {
         let stems = |rows: &[Row]| -> Vec<String> {
-            let report = report(rows, &ReportParams::default());
+            let report = report_of(rows);
             report.figures.into_iter().map(|f| f.stem).collect()
         };
         let mut fine = row("a", BoundaryRule::FLOPPY, 0.02, 50.0);
@@ -266,10 +363,7 @@ mod tests {
         };
         let coarse = row("a", BoundaryRule::FLOPPY, 0.1, 30.0);
         assert_eq!(stems(&[]), Vec::<String>::new());
-        assert_eq!(
-            stems(std::slice::from_ref(&coarse)),
-            ["convergence-a", "wall-time"]
-        );
+        assert_eq!(stems(std::slice::from_ref(&coarse)), ["convergence-a"]);
         assert_eq!(
             stems(&[
                 coarse.clone(),
@@ -277,10 +371,10 @@ mod tests {
                 row("b", BoundaryRule::FLOPPY, 0.1, 10.0)
             ]),
             [
+                "bv-tv",
+                "answers",
                 "convergence-a",
                 "convergence-b",
-                "bv-tv",
-                "wall-time",
                 "speed-error"
             ]
         );

@@ -4,16 +4,15 @@
 //! colours say, so that a figure survives black-and-white print.
 
 use crate::error::{Error, Result};
-use crate::report::figure::{Content, Curve, Figure, Mark, Point};
+use crate::report::figure::{Content, Curve, Figure, GroupOfPoints, Mark, Point};
 use kuva::backend::png::PngBackend;
 use kuva::backend::svg::SvgBackend;
-use kuva::plot::boxplot::BoxPlot;
 use kuva::plot::legend::LegendPosition;
 use kuva::plot::line::{LinePlot, LineStyle};
 use kuva::plot::scatter::{MarkerShape, ScatterPlot};
 use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
-use kuva::render::render::{Scene, render_multiple};
+use kuva::render::render::{Primitive, Scene, render_multiple};
 
 /// Okabe and Ito's palette without its yellow, which is too pale on paper.
 const HUES: [&str; 7] = [
@@ -36,17 +35,21 @@ const DASHES: [&str; 4] = ["", "7 3", "2 3", "7 3 2 3"];
 const PNG_SCALE: f32 = 2.75;
 
 /// A drawn figure.
-pub struct Drawing(Scene);
+pub struct Drawing {
+    scene: Scene,
+    /// Drawn again for pixels: their dashes are counted in pixels, and round ends make each longer.
+    in_pixels: Scene,
+}
 
 impl Drawing {
     pub fn svg(&self) -> String {
-        SvgBackend::new().render_scene(&self.0)
+        SvgBackend::new().render_scene(&self.scene)
     }
 
     pub fn png(&self) -> Result<Vec<u8>> {
         PngBackend::new()
             .with_scale(PNG_SCALE)
-            .render_scene(&self.0)
+            .render_scene(&self.in_pixels)
             .map_err(|e| {
                 Error::specimen(
                     format!("a figure could not be drawn: {e}"),
@@ -58,13 +61,60 @@ impl Drawing {
 
 /// Draws a figure.
 pub fn draw(figure: &Figure) -> Drawing {
-    let plots = match &figure.content {
+    let mut in_pixels = scene(figure);
+    in_pixels.elements.iter_mut().for_each(scale_dashes);
+    Drawing {
+        scene: scene(figure),
+        in_pixels,
+    }
+}
+
+fn scene(figure: &Figure) -> Scene {
+    let plots: Vec<Plot> = match &figure.content {
         Content::Curves(curves) => curves.iter().flat_map(plots_of).collect(),
-        Content::Boxes(boxes) => vec![boxplot(boxes)],
+        Content::Groups(groups) => groups
+            .iter()
+            .enumerate()
+            .flat_map(|(at, group)| group_plots(at as f64 + 1.0, group))
+            .collect(),
     };
     let layout = layout(figure, &plots);
-    Drawing(render_multiple(plots, layout))
+    render_multiple(plots, layout)
 }
+
+fn scale_dashes(element: &mut Primitive) {
+    let (dashes, width) = match element {
+        Primitive::Line {
+            stroke_dasharray: Some(d),
+            stroke_width,
+            ..
+        }
+        | Primitive::PolyLine {
+            stroke_dasharray: Some(d),
+            stroke_width,
+            ..
+        } => (d, *stroke_width),
+        Primitive::Path(path) => match &mut path.stroke_dasharray {
+            Some(d) => (d, path.stroke_width),
+            None => return,
+        },
+        _ => return,
+    };
+    let scale = f64::from(PNG_SCALE);
+    let scaled = dashes
+        .split([' ', ','])
+        .enumerate()
+        .filter_map(|(i, word)| {
+            let length: f64 = word.parse().ok()?;
+            // A round end on both sides of each dash takes from the gap after it.
+            let ends = if i % 2 == 0 { -width } else { width };
+            Some(format!("{:.1}", scale * (length + ends).max(0.5)))
+        });
+    *dashes = scaled.collect::<Vec<_>>().join(" ");
+}
+
+/// Letters of an axis of words that fit side by side.
+const LABELS_FIT: usize = 58;
 
 fn layout(figure: &Figure, plots: &[Plot]) -> Layout {
     let mut layout = Layout::auto_from_plots(plots)
@@ -73,22 +123,26 @@ fn layout(figure: &Figure, plots: &[Plot]) -> Layout {
         .with_title(figure.title.clone())
         .with_x_label(figure.x.label.clone())
         .with_y_label(figure.y.label.clone())
-        .with_legend_position(LegendPosition::OutsideRightTop)
+        .with_legend_position(LegendPosition::OutsideBottomColumns)
         .with_legend_box(false)
         .with_font_family("DejaVu Sans, Helvetica, Arial, sans-serif")
         .with_title_size(15)
         .with_label_size(13)
         .with_tick_size(12)
         .with_body_size(12);
-    if let Content::Boxes(boxes) = &figure.content {
-        // Whiskers leave outliers outside the axis that the crate would choose.
-        let values = boxes.iter().flat_map(|(_, values)| values);
-        let (low, high) = values.fold((0.0f64, 0.0f64), |(low, high), v| {
-            (low.min(*v), high.max(*v))
-        });
+    let words = categories(figure);
+    if !words.is_empty() {
+        let letters: usize = words.iter().map(|w| w.chars().count() + 2).sum();
         layout = layout
-            .with_y_axis_min(1.05 * low)
-            .with_y_axis_max(1.05 * high);
+            .with_x_axis_min(0.5)
+            .with_x_axis_max(words.len() as f64 + 0.5);
+        if letters > LABELS_FIT {
+            layout = layout.with_x_tick_rotate(-40.0);
+        }
+        layout = layout.with_x_categories(words);
+    }
+    if let Some([low, high]) = y_range(figure) {
+        layout = layout.with_y_axis_min(low).with_y_axis_max(high);
     }
     if figure.x.log {
         layout = layout.with_log_x().with_x_tick_format(plain_ticks());
@@ -97,6 +151,53 @@ fn layout(figure: &Figure, plots: &[Plot]) -> Layout {
         layout = layout.with_log_y().with_y_tick_format(plain_ticks());
     }
     layout
+}
+
+fn categories(figure: &Figure) -> Vec<String> {
+    match &figure.content {
+        Content::Groups(groups) => groups.iter().map(|g| g.label.clone()).collect(),
+        Content::Curves(_) => figure.x.categories.clone(),
+    }
+}
+
+/// Of a linear axis: from 0, unless values lie below, to a little above all values and their errors. None for the crate's
+/// own choice.
+fn y_range(figure: &Figure) -> Option<[f64; 2]> {
+    let mut all = Vec::new();
+    match &figure.content {
+        Content::Groups(groups) => {
+            for g in groups {
+                all.extend(g.values.iter().copied());
+                all.extend(g.mean.into_iter().flatten());
+            }
+        }
+        Content::Curves(curves) => {
+            for p in curves.iter().flat_map(|c| &c.points) {
+                let [down, up] = p.y_error.unwrap_or_default();
+                all.extend([p.y - down, p.y + up]);
+            }
+        }
+    }
+    let (low, high) = all
+        .iter()
+        .fold((0f64, 0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    let usable = !figure.y.log && high > low && (high - low).is_finite();
+    usable.then(|| {
+        let above = if high > 0.0 { 0.06 * (high - low) } else { 0.0 };
+        let below = if low < 0.0 { 0.06 * (high - low) } else { 0.0 };
+        nice([low - below, high + above])
+    })
+}
+
+/// Ends at round numbers, so that the axis' first and last marks are its ends.
+fn nice([low, high]: [f64; 2]) -> [f64; 2] {
+    let power = 10f64.powf(((high - low) / 5.0).log10().floor());
+    let steps = [1.0, 2.0, 2.5, 5.0, 10.0].map(|m| m * power);
+    let step = steps
+        .into_iter()
+        .find(|s| (high - low) / s <= 6.0)
+        .unwrap_or(power);
+    [(low / step).floor() * step, (high / step).ceil() * step]
 }
 
 /// 0.1, 0.2, 10: what a reader of a log axis expects.
@@ -157,15 +258,95 @@ fn markers(curve: &Curve, hue: &str) -> ScatterPlot {
     }
 }
 
-/// Pale boxes, so that the scans' points show on them.
-fn boxplot(boxes: &[(String, Vec<f64>)]) -> Plot {
-    let plot = boxes.iter().fold(BoxPlot::new(), |plot, (label, values)| {
-        plot.with_group(label.clone(), values.clone())
-    });
-    Plot::Box(
-        plot.with_color("#9dbcd4")
-            .with_swarm_overlay()
-            .with_overlay_color("#1b1b1b")
-            .with_overlay_size(2.5),
-    )
+/// Half the width of a group's median, in places of the axis.
+const HALF: f64 = 0.28;
+
+/// Points side by side around the group's place, its median as a line, its mean with its interval beside them.
+fn group_plots(at: f64, group: &GroupOfPoints) -> Vec<Plot> {
+    let hue = HUES[group.hue % HUES.len()];
+    let n = group.values.len();
+    // The golden ratio spreads any number of points evenly.
+    let aside = |i: usize| HALF * 0.9 * (2.0 * (0.5 + 0.618_034 * i as f64).fract() - 1.0);
+    let points = (0..n).map(|i| (at + aside(i), group.values[i]));
+    let mut plots = vec![Plot::Scatter(
+        ScatterPlot::new()
+            .with_data(points)
+            .with_color(hue)
+            .with_size(3.5)
+            .with_marker(MARKERS[group.hue % MARKERS.len()]),
+    )];
+    if let Some(median) = group.median {
+        plots.push(Plot::Line(
+            LinePlot::new()
+                .with_data([(at - HALF, median), (at + HALF, median)])
+                .with_color("#1b1b1b")
+                .with_stroke_width(2.0),
+        ));
+    }
+    if let Some([mean, low, high]) = group.mean {
+        plots.push(Plot::Scatter(
+            ScatterPlot::new()
+                .with_data([(at + HALF + 0.07, mean)])
+                .with_color("#1b1b1b")
+                .with_size(4.0)
+                .with_marker(MarkerShape::Diamond)
+                .with_y_err_asymmetric([(mean - low, high - mean)]),
+        ));
+    }
+    plots
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::figure::Axis;
+
+    fn rule(dash: usize) -> Figure {
+        Figure {
+            x: Axis::linear("x"),
+            y: Axis::linear("y"),
+            content: Content::Curves(vec![Curve {
+                name: "a long name that a legend must hold as a whole".to_owned(),
+                hue: 0,
+                shape: dash,
+                mark: Mark::Joined,
+                points: vec![Point::new(0.0, 1.0), Point::new(1.0, 2.0)],
+            }]),
+            ..Figure::default()
+        }
+    }
+
+    #[test]
+    fn dashes_of_pixels_are_as_long_as_those_of_vectors() {
+        let dashes = |scene: &Scene| -> Vec<f64> {
+            let found = scene.elements.iter().find_map(|e| match e {
+                Primitive::PolyLine {
+                    stroke_dasharray, ..
+                }
+                | Primitive::Line {
+                    stroke_dasharray, ..
+                } => stroke_dasharray.clone(),
+                Primitive::Path(p) => p.stroke_dasharray.clone(),
+                _ => None,
+            });
+            let found = found.expect("a dashed line");
+            found.split(' ').map(|w| w.parse().unwrap()).collect()
+        };
+        let drawing = draw(&rule(1));
+        let (svg, png) = (dashes(&drawing.scene), dashes(&drawing.in_pixels));
+        let sum = |d: &[f64]| d.iter().sum::<f64>();
+        assert!(
+            (sum(&png) / sum(&svg) - f64::from(PNG_SCALE)).abs() < 0.05,
+            "{svg:?} {png:?}"
+        );
+    }
+
+    #[test]
+    fn a_legend_is_whole_and_an_axis_begins_at_zero() {
+        let drawing = draw(&rule(0));
+        let svg = drawing.svg();
+        assert!(svg.contains("a long name that a legend must hold as a whole"));
+        assert_eq!(y_range(&rule(0)), Some([0.0, 2.5]));
+        assert_eq!(nice([-3.0, 97.0]), [-20.0, 100.0]);
+    }
 }

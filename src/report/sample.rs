@@ -15,7 +15,7 @@ pub(super) struct Case {
     pub group: Option<String>,
     pub bv_tv: f64,
     pub e_app_mpa: f64,
-    /// Stated error, algebraic and discretisation together, over the modulus.
+    /// All that is stated of the error, over the modulus.
     pub stated: Option<f64>,
 }
 

@@ -1,5 +1,6 @@
 //! Owns the report's statistics over scans: which methods are held against which, and the tables of it.
 
+use super::cells::p_value;
 use super::sample::{LEAST_SCANS, Sample};
 use super::{Model, distinct};
 use crate::result::statistics::agreement::{Agreement, agreement};
@@ -54,11 +55,22 @@ impl Statistics {
     pub(super) fn analysis_of_variance(&self) -> Option<String> {
         let a = self.anova.as_ref()?;
         Some(format!(
-            "Analysis of variance between {} over {} scans: Greenhouse–Geisser ε = {:.3}, corrected p = {:.3e}",
+            "Analysis of variance between {} over {} scans: F({}, {}) = {:.4}, p = {}{}",
             self.anova_between.join("; "),
             a.specimens,
-            a.epsilon,
-            a.p_greenhouse_geisser
+            a.df_methods,
+            a.df_error,
+            a.f,
+            p_value(Some(a.p_greenhouse_geisser)).text,
+            // Two methods cannot but be spherical.
+            match a.methods > 2 {
+                true => format!(
+                    " (corrected by Greenhouse and Geisser, ε = {:.3}; {} uncorrected)",
+                    a.epsilon,
+                    p_value(Some(a.p)).text
+                ),
+                false => String::new(),
+            }
         ))
     }
 }

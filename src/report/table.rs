@@ -31,7 +31,7 @@ pub struct Line {
     pub voxel_fe_extrapolated_over_tissue: Option<f64>,
     /// All solves of the line together.
     pub wall_s: Option<f64>,
-    /// Stated algebraic and discretisation error of each model's modulus in MPa, by [`Model`]. Not a column: the rows of
+    /// Stated error of the solver, and of discretisation and shape together, of each model's modulus in MPa, by [`Model`]. Not a column: the rows of
     /// `results.csv` hold them.
     #[serde(skip)]
     pub errors_mpa: [[Option<f64>; 2]; Model::ALL.len()],
@@ -50,7 +50,7 @@ impl Line {
         }
     }
 
-    /// Stated algebraic and discretisation error of the modulus in MPa, each where there is one.
+    /// Stated error of the solver, and of discretisation and shape together, in MPa, each where there is one.
     pub fn stated_errors(&self, model: Model) -> [Option<f64>; 2] {
         self.errors_mpa[model as usize]
     }

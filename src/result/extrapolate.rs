@@ -280,7 +280,11 @@ mod tests {
     const GRADED: Option<BoundaryRule> = Some(BoundaryRule::GRADED);
 
     fn error(row: &Row) -> f64 {
-        row.stated_errors_mpa()[1].unwrap()
+        row.solved
+            .as_ref()
+            .unwrap()
+            .discretization_error_mpa
+            .unwrap()
     }
 
     fn note(row: &Row) -> &str {

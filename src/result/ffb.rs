@@ -1,6 +1,8 @@
 //! Owns the firm and floppy boundary's mean (Zojaji et al. 2024): at one lattice parameter, FFB is the mean of the firm
 //! and the floppy modulus. Its stated error is half their gap, which is a bracket, not a likely error.
 
+use crate::result::cautions::WARNING;
+use crate::result::notes;
 use crate::result::row::{Marks, Row, Solution};
 use crate::result::settings::{BoundaryRule, Settings};
 use crate::result::shape;
@@ -46,7 +48,7 @@ fn mean_row(a: &Row, b: &Row) -> Row {
             }
         }),
         marks: Marks {
-            note: unconverged(a, b),
+            note: note(a, b),
             ..a.marks.clone()
         },
     }
@@ -79,10 +81,25 @@ fn both_converged(a: &Solution, b: &Solution) -> Option<bool> {
     }
 }
 
-/// A mean of an unconverged modulus must say so.
-fn unconverged(a: &Row, b: &Row) -> Option<String> {
-    let failed = [a, b].iter().any(|row| row.converged() == Some(false));
-    failed.then(|| "mean of a modulus that is not converged".to_owned())
+/// A mean of an unconverged modulus must say so, and what its parts are warned of it is warned of, too.
+fn note(a: &Row, b: &Row) -> Option<String> {
+    let mut note = None;
+    let parts = || [a, b].into_iter();
+    if parts().any(|row| row.converged() == Some(false)) {
+        notes::add(&mut note, "mean of a modulus that is not converged");
+    }
+    if a.is_disconnected() != b.is_disconnected() {
+        notes::add(
+            &mut note,
+            "warning: one of its parts carries no load: half of the other is no estimate",
+        );
+    }
+    let all = parts().filter_map(|row| row.marks.note.as_deref());
+    let warnings = all
+        .flat_map(|all| all.split("; "))
+        .filter(|n| n.starts_with(WARNING));
+    warnings.for_each(|warning| notes::add(&mut note, warning));
+    note
 }
 
 #[cfg(test)]

@@ -1,7 +1,11 @@
 //! What rows of results say: the row itself, means and limits of several rows, statistics of many.
 
+pub mod answer;
+pub mod cautions;
+pub mod condition;
 pub mod extrapolate;
 pub mod ffb;
+pub mod notes;
 pub mod row;
 pub mod settings;
 pub mod shape;

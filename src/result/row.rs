@@ -84,11 +84,13 @@ impl Row {
         self.solved.as_ref()?.wall_s
     }
 
-    /// Stated algebraic and discretisation error in MPa, each where there is one.
+    /// Stated errors in MPa: of the solver; of the discretisation and of the shape together, None unless both are known.
     pub fn stated_errors_mpa(&self) -> [Option<f64>; 2] {
-        self.solved.as_ref().map_or([None, None], |s| {
-            [s.algebraic_error_mpa, s.discretization_error_mpa]
-        })
+        let Some(s) = &self.solved else {
+            return [None, None];
+        };
+        let model = s.discretization_error_mpa.zip(s.shape_error_mpa);
+        [s.algebraic_error_mpa, model.map(|(d, shape)| d + shape)]
     }
 
     /// Everything that is stated of the modulus, in MPa: algebraic, discretisation and shape error. None unless the last two
@@ -97,9 +99,8 @@ impl Row {
         if self.is_disconnected() {
             return Some(0.0);
         }
-        let solved = self.solved.as_ref()?;
-        let algebraic = solved.algebraic_error_mpa.unwrap_or(0.0);
-        Some(algebraic + solved.discretization_error_mpa? + solved.shape_error_mpa?)
+        let [algebraic, model] = self.stated_errors_mpa();
+        Some(algebraic.unwrap_or(0.0) + model?)
     }
 
     /// The same over the modulus.

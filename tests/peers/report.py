@@ -87,8 +87,16 @@ def main():
             pictures.mkdir(parents=True, exist_ok=True)
             page.screenshot(path=pictures / "report.png", full_page=True)
             page.pdf(path=pictures / "report.pdf", format="A4", print_background=True)
+        # Methods, times and validation are behind folds.
+        page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
         tables, columns = check_tables(page)
         links = check_links(page)
+        page.set_viewport_size({"width": 390, "height": 844})
+        if pictures:
+            page.screenshot(path=pictures / "phone.png", full_page=True)
+        narrow = page.evaluate("document.documentElement.scrollWidth")
+        assert narrow <= 390, f"the page is {narrow} pixels wide on a phone"
+        page.set_viewport_size({"width": 1280, "height": 900})
         outside = [url for url in asked if not url.startswith(("file:", "data:"))]
         assert not outside, f"the page asks for {outside}"
         assert not wrong, wrong

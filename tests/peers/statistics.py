@@ -18,8 +18,12 @@ try:
     import numpy as np
     import pandas as pd
     import pingouin
+    import scipy.optimize
     import scipy.stats
     import statsmodels.api as sm
+    from statsmodels.stats.meta_analysis import effectsize_smd
+    from statsmodels.stats.multitest import multipletests
+    from statsmodels.stats.weightstats import CompareMeans, DescrStatsW
     from statsmodels.stats.anova import AnovaRM
 except ImportError as missing:
     sys.exit(f"skipped: {missing}; pip install scipy statsmodels pandas pingouin")
@@ -31,6 +35,61 @@ def data():
     text = (ROOT / "mod.rs").read_text()
     found = re.findall(r"pub const (\w): \[f64; 8\] = \[(.*?)\]", text, re.S)
     return {name: np.array([float(v) for v in values.split(",") if v.strip()]) for name, values in found}
+
+
+def groups(d):
+    """Two independent groups: A[:5] and B[3:]."""
+    a, b = d["A"][:5], d["B"][3:]
+    test = scipy.stats.ttest_ind(a, b, equal_var=False)
+    means = CompareMeans(DescrStatsW(a), DescrStatsW(b))
+    low, high = means.tconfint_diff(usevar="unequal")
+    assert abs(means.ttest_ind(usevar="unequal")[1] / test.pvalue - 1) < 1e-9
+    n = len(a) + len(b)
+    pooled = np.sqrt(((len(a) - 1) * a.var(ddof=1) + (len(b) - 1) * b.var(ddof=1)) / (n - 2))
+    g, _ = effectsize_smd(a.mean(), a.std(ddof=1), len(a), b.mean(), b.std(ddof=1), len(b))
+    scale = np.sqrt(1 / len(a) + 1 / len(b))
+    t = (a.mean() - b.mean()) / pooled / scale
+    place = lambda share: scipy.optimize.brentq(
+        lambda nc: scipy.stats.nct.cdf(t, n - 2, nc) - share, t - 8, t + 8, xtol=1e-14, rtol=1e-14
+    )
+    j = 1 - 3 / (4 * n - 9)
+    exact = scipy.stats.mannwhitneyu(a, b, alternative="two-sided")
+    tied = scipy.stats.mannwhitneyu(np.round(a / 20), np.round(b / 20), alternative="two-sided")
+    holm = multipletests([0.02, 0.011, 0.5, 0.012], method="holm")[1]
+    one = DescrStatsW(d["A"])
+    interval = one.tconfint_mean()
+    return {
+        "summary.rs": {
+            "SUM_MEAN": one.mean,
+            "SUM_SD": d["A"].std(ddof=1),
+            "SUM_LOW": interval[0],
+            "SUM_HIGH": interval[1],
+        },
+        "student.rs": {
+            "T_QUANTILE_7": scipy.stats.t.ppf(0.975, 7),
+            "T_QUANTILE_2_5": scipy.stats.t.ppf(0.975, 2.5),
+            "NCT_CDF": scipy.stats.nct.cdf(2.0, 5, 1.2),
+            "NCT_CDF_NEGATIVE": scipy.stats.nct.cdf(-0.4, 14, 0.7),
+        },
+        "welch.rs": {
+            "W_DIFFERENCE": a.mean() - b.mean(),
+            "W_LOW": low,
+            "W_HIGH": high,
+            "W_T": test.statistic,
+            "W_FREEDOM": test.df,
+            "W_P": test.pvalue,
+            "HG_G": g,
+            "HG_LOW": j * scale * place(0.975),
+            "HG_HIGH": j * scale * place(0.025),
+        },
+        "mann_whitney.rs": {
+            "MW_U": exact.statistic,
+            "MW_P": exact.pvalue,
+            "MW_TIED_U": tied.statistic,
+            "MW_TIED_P": tied.pvalue,
+        },
+        "holm.rs": {f"HOLM_{i + 1}": p for i, p in enumerate(holm)},
+    }
 
 
 def expected():
@@ -51,7 +110,7 @@ def expected():
     reported = next(corrected[name] for name in corrected.index if name.lower() in ("p-gg-corr", "p_gg_corr"))
     assert abs(reported / p_gg - 1) < 1e-9, (reported, p_gg)
     q1, q2, q3 = np.percentile(d["A"], [25, 50, 75])
-    return {
+    return groups(d) | {
         "regression.rs": {
             "REG_SLOPE": fit.params[1],
             "REG_INTERCEPT": fit.params[0],

@@ -100,12 +100,10 @@ fn curves(stem: &str, scenes: Vec<(String, String)>) {
     }
     let drawing = plot::draw(&Figure {
         stem: stem.to_owned(),
-        scan: None,
-        title: String::new(),
-        caption: String::new(),
         x: Axis::linear("time"),
         y: Axis::linear("mean relative density change"),
         content: Content::Curves(content),
+        ..Figure::default()
     });
     std::fs::write(
         pictures().join(format!("{stem}.png")),

@@ -191,9 +191,6 @@ impl<'a> Writer<'a> {
             .collect();
         let figure = Figure {
             stem: "history".into(),
-            scan: None,
-            title: String::new(),
-            caption: String::new(),
             x: Axis::linear("time"),
             y: Axis::linear(name),
             content: Content::Curves(vec![Curve {
@@ -203,6 +200,7 @@ impl<'a> Writer<'a> {
                 mark: Mark::Rule,
                 points,
             }]),
+            ..Figure::default()
         };
         let drawing = plot::draw(&figure);
         atomic::write(&self.out.join("history.svg"), drawing.svg())?;

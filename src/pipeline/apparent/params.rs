@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
+use crate::io::percent;
 use crate::measure::pistoia::Pistoia;
 use crate::physics::material::Material;
 use crate::pipeline::apparent::fields::Field;
@@ -29,6 +30,7 @@ pub struct SolveParams {
     /// How tissue differs from voxel to voxel. None: E and ν as above everywhere.
     pub material: Option<Material>,
     /// Nominal strain u / L_g; negative is compression.
+    #[serde(deserialize_with = "percent::deserialize")]
     pub strain: f64,
     /// Thickness of each grip; 0: the end planes.
     pub grip_mm: f64,
@@ -38,6 +40,7 @@ pub struct SolveParams {
     pub conditions: Conditions,
     pub axis: Axis,
     /// Relative algebraic error allowed in the headline modulus (0.001 is 0.1 %).
+    #[serde(deserialize_with = "percent::deserialize")]
     pub tolerance: f64,
     pub max_iterations: usize,
     /// voxel-fe: each voxel becomes this many elements along every axis.

@@ -185,7 +185,14 @@ pub(super) fn nothing_selected(window: &Window, grey: &Grey) -> Error {
             grey.min,
             grey.max
         ),
-        "choose a window inside that range (image's own units; smoothing narrows it), or --otsu",
+        match (grey.min, grey.max) {
+            (0.0, 1.0) => {
+                "values of 0 and 1 are a mask: give --labels 1 (in a recipe labels = [1] and no lower, upper)"
+            }
+            _ => {
+                "choose a window inside that range (image's own units; smoothing narrows it), or --otsu"
+            }
+        },
     )
 }
 

@@ -1,6 +1,6 @@
 //! Owns the agreement of two methods (Bland and Altman 1986, <https://doi.org/10.1016/S0140-6736(86)90837-8>).
 
-use super::regression::two_sided;
+use super::student::two_sided;
 use super::{deviations, mean};
 use serde::Serialize;
 

@@ -3,8 +3,13 @@
 
 pub mod agreement;
 pub mod anova;
+pub mod holm;
+pub mod mann_whitney;
 pub mod quartiles;
 pub mod regression;
+mod student;
+pub mod summary;
+pub mod welch;
 
 pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64

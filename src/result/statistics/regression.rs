@@ -1,8 +1,8 @@
 //! Owns straight-line regression by least squares.
 
+use super::student::two_sided;
 use super::{deviations, mean};
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// `y = intercept + slope · x`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
@@ -46,14 +46,6 @@ pub fn regression(x: &[f64], y: &[f64]) -> Option<Regression> {
         slope_p: two_sided(slope / slope_standard_error, freedom),
         intercept_p: two_sided(intercept / intercept_standard_error, freedom),
     })
-}
-
-/// Two-sided p of a t value; 0 where the fit is exact.
-pub(super) fn two_sided(t: f64, freedom: f64) -> f64 {
-    match StudentsT::new(0.0, 1.0, freedom) {
-        Ok(student) if t.is_finite() => 2.0 * student.sf(t.abs()),
-        _ => 0.0,
-    }
 }
 
 #[cfg(test)]

@@ -1,27 +1,40 @@
 //! Owns `report` on disk: rows of any number of solved scans in; tables, plots and pages out.
 
+mod facts;
+mod stiffness;
+
+use crate::command::stiffness::RECORD;
+use crate::command::{answer, fields};
 use crate::error::Result;
-use crate::grid::Axis;
+use crate::image::scan;
 use crate::io::{atomic, table};
 use crate::machine::host;
 use crate::machine::session::Session;
-use crate::measure::spheres::Spread;
 use crate::recipe::Recipe;
 use crate::record::collect_rows::CollectedRows;
 use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
+use crate::report::answers;
+use crate::report::answers::Answers;
 use crate::report::html;
 use crate::report::html::{ScanPage, Source};
 use crate::report::{Report, ReportParams, report as assemble};
 use crate::report::{markdown, plot};
+use crate::result::answer::ScanFacts;
 use crate::result::ffb::with_ffb;
 use crate::result::row::Row;
 use std::path::{Path, PathBuf};
 
 /// The recipe as it was run, in the output folder of a run.
 pub const RECIPE: &str = "recipe.toml";
+
+/// The recipe of an earlier run into the same folder, where it differs.
+pub const OLD_RECIPE: &str = "recipe.old.toml";
+
+/// One line a scan.
+pub const ANSWERS: &str = "answers.csv";
 
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Scans that
 /// were solved again in their own folders after the run are read from there. Returns the files written.
@@ -41,20 +54,53 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
         .map_or_else(ReportParams::default, |recipe| recipe.report);
     // Means of older programs do not say whether they are converged.
     let rows = with_ffb(&rows);
-    write(&rows, &failures, &params, dirs, recipe, out, session)
+    let answers = answers(&rows, dirs, None);
+    let sources = Sources {
+        rows: &rows,
+        answers,
+        failures: &failures,
+        params: &params,
+        dirs,
+        recipe,
+    };
+    write(sources, out, session)
 }
 
-/// Writes the report of `rows` into `out`. `dirs` are searched for what is known of the scans.
-pub fn write(
-    rows: &[Row],
-    failures: &[Failure],
-    params: &ReportParams,
-    dirs: &[PathBuf],
-    recipe: Option<String>,
-    out: &Path,
-    session: &Session,
-) -> Result<Vec<PathBuf>> {
-    let mut report = assemble(rows, params);
+/// The answers of `rows`, with what the folders of the scans, under `dirs`, say of them. `target` is the relative error asked for;
+/// without it that of each scan's last solve.
+pub fn answers(rows: &[Row], dirs: &[PathBuf], target: Option<f64>) -> Answers {
+    answers::answers(rows, |scan| {
+        let facts =
+            folder(scan, dirs).map_or_else(ScanFacts::default, |(dir, _)| answer::facts(&dir));
+        ScanFacts {
+            target: target.or(facts.target),
+            ..facts
+        }
+    })
+}
+
+/// What a report is of. `dirs` are searched for what is known of the scans.
+pub struct Sources<'a> {
+    pub rows: &'a [Row],
+    pub answers: Answers,
+    pub failures: &'a [Failure],
+    pub params: &'a ReportParams,
+    pub dirs: &'a [PathBuf],
+    pub recipe: Option<String>,
+}
+
+/// Writes the report into `out`. Returns the files written.
+pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<PathBuf>> {
+    let Sources {
+        rows,
+        answers,
+        failures,
+        params,
+        dirs,
+        recipe,
+    } = sources;
+    let mut report = assemble(rows, answers, params);
+    report.notes.extend(same_masks(rows, dirs));
     let failed = failures.iter().map(|f| {
         let reason = f.reason.lines().next().unwrap_or_default();
         format!("{}: failed, no results: {reason}", f.scan)
@@ -91,6 +137,9 @@ fn render(report: &Report, session: &Session) -> Result<Vec<(String, Vec<u8>)>> 
     let text = |name: &str, content: String| (name.to_owned(), content.into_bytes());
     let mut files = vec![
         text("report.md", markdown::render(report)),
+        text(ANSWERS, table::to_csv(&report.answers.lines)),
+        text("groups.csv", table::to_csv(&report.groups.lines)),
+        text("comparisons.csv", table::to_csv(&report.groups.comparisons)),
         text("e_app.csv", table::to_csv(&report.lines)),
         text(results::TABLE, table::to_csv(&report.rows)),
     ];
@@ -127,100 +176,73 @@ fn pages(rows: &[Row], dirs: &[PathBuf]) -> Vec<ScanPage> {
     pages
 }
 
-fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
+/// The folder of a scan, and what was segmented there.
+fn folder(scan: &str, dirs: &[PathBuf]) -> Option<(PathBuf, SegmentRecord)> {
     let places = dirs.iter().flat_map(|dir| [dir.join(scan), dir.clone()]);
-    let found = places
+    places
         .filter_map(|dir| specimen::record(&dir).map(|record| (dir, record)))
-        .find(|(_, record)| record.scan == scan);
-    let Some((dir, record)) = found else {
+        .find(|(_, record)| record.scan == scan)
+}
+
+/// Scans whose masks are one, voxel by voxel: the same specimen, counted twice.
+fn same_masks(rows: &[Row], dirs: &[PathBuf]) -> Vec<String> {
+    let mut seen: Vec<(String, Vec<String>)> = Vec::new();
+    for page in pages(rows, &[]) {
+        let mask = folder(&page.scan, dirs).map(|(dir, _)| dir.join(specimen::MASK));
+        let Some(hash) = mask.and_then(|mask| scan::hash(&mask).ok()) else {
+            continue;
+        };
+        match seen.iter_mut().find(|(known, _)| *known == hash) {
+            Some((_, scans)) => scans.push(page.scan),
+            None => seen.push((hash, vec![page.scan])),
+        }
+    }
+    let twice = seen.into_iter().filter(|(_, scans)| scans.len() > 1);
+    twice
+        .map(|(_, scans)| {
+            format!(
+                "{} are the same mask voxel by voxel: one specimen that is counted {} times, unless the manifest gives them one subject",
+                scans.join(" and "),
+                scans.len()
+            )
+        })
+        .collect()
+}
+
+fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
+    let Some((dir, record)) = folder(scan, dirs) else {
         return ScanPage {
             scan: scan.to_owned(),
             ..ScanPage::default()
         };
     };
+    let slices = std::fs::read(dir.join(specimen::PICTURE)).ok();
+    let caption = "Mid-slices of the three planes, with the outline of the mask".to_owned();
     ScanPage {
         scan: scan.to_owned(),
-        picture: std::fs::read(dir.join(specimen::PICTURE)).ok(),
-        facts: facts(&record),
+        pictures: slices
+            .into_iter()
+            .map(|png| (caption.clone(), png))
+            .chain(fields::pictures(&dir))
+            .collect(),
+        facts: facts::facts(&record),
+        stiffness: crate::record::stiffness::record(&dir.join(RECORD))
+            .map(|record| self::stiffness::shown(&record)),
+        files: files(&dir),
     }
 }
 
-fn facts(record: &SegmentRecord) -> Vec<(String, String)> {
-    let results = &record.results;
-    let three = |values: [String; 3]| values.join(" × ");
-    let mut facts = vec![
-        ("input", record.input.path.display().to_string()),
-        ("BLAKE3 of the input", record.input.blake3.clone()),
-        ("format", record.input.format.clone()),
-        ("voxels", three(results.voxels.map(|n| n.to_string()))),
-        (
-            "voxel size (mm)",
-            three(results.spacing_mm.map(|h| h.to_string())),
-        ),
-        ("threshold", threshold(record)),
-        ("BV (mm³)", format!("{:.4}", results.bv_mm3)),
-        (
-            "TV (mm³)",
-            format!("{:.4}, {}", results.tv_mm3, results.tv_definition),
-        ),
-        ("BV/TV", format!("{:.4}", results.bv_tv)),
-        (
-            "voxels removed as unconnected",
-            results.removed_voxels.to_string(),
-        ),
-    ];
-    if record.settings.turn != Axis::Z {
-        let turned = format!("its {} axis is now z", record.settings.turn.name());
-        facts.push(("turned", turned));
-    }
-    if let Some(r) = results.rotation {
-        let [x, y, z] = r.direction;
-        let words = format!(
-            "by {:.1}°, ({x:.3}, {y:.3}, {z:.3}) is now z; a box of {:.0} % of the volume",
-            r.angle_deg,
-            100.0 * r.kept
-        );
-        facts.push(("rotated", words));
-    }
-    if let Some([low, high]) = results.plane_cut_mm {
-        facts.push(("ends cut flat (mm)", format!("{low:.3} and {high:.3}")));
-    }
-    if let Some(t) = results.mean_thickness_mm {
-        facts.push(("mean strut thickness (mm)", format!("{t:.3}")));
-    }
-    if let Some(m) = &results.morphometry {
-        let spread = |s: &Option<Spread>| {
-            s.as_ref().map_or("NA".into(), |s| {
-                format!("{:.3} ± {:.3}", s.mean_mm, s.sd_mm)
-            })
-        };
-        facts.push(("Tb.Th (mm)", spread(&m.tb_th)));
-        facts.push(("Tb.Sp (mm)", spread(&m.tb_sp)));
-        facts.push(("Conn.D (1/mm³)", format!("{:.3}", m.conn_d_per_mm3)));
-        let da = m.fabric.map_or("NA".into(), |f| format!("{:.3}", f.da));
-        facts.push(("DA", da));
-    }
-    facts.extend(results.warnings.iter().map(|w| ("warning", w.clone())));
-    facts
-        .into_iter()
-        .map(|(key, value)| (key.to_owned(), value))
-        .collect()
-}
-
-fn threshold(record: &SegmentRecord) -> String {
-    let (lower, upper) = (record.results.lower, record.results.upper);
-    let unit = record
-        .input
-        .unit
-        .as_deref()
-        .unwrap_or("in the image's units");
-    // Otsu's threshold has digits that mean nothing.
-    let bound =
-        |v: Option<f64>| v.map_or("∞".to_owned(), |v| ((v * 1e3).round() / 1e3).to_string());
-    format!(
-        "{}: {} to {} {unit}",
-        record.results.threshold,
-        bound(lower),
-        bound(upper)
-    )
+/// Fields, curves and models that were asked for.
+fn files(dir: &Path) -> Vec<String> {
+    let wanted = |name: &str| {
+        name.starts_with("field") && !name.ends_with(".png")
+            || name.ends_with(".inp")
+            || name == "curve.csv"
+            || name == "fracture.csv"
+    };
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| wanted(name)).collect();
+    names.sort();
+    names
 }

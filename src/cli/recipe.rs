@@ -1,0 +1,31 @@
+//! `recipe`: the recipes that are in the program.
+
+use bonepd_ct::command::Outcome;
+use bonepd_ct::error::Result;
+use bonepd_ct::recipe::{BUILT_IN, built_in};
+use clap::Args;
+use std::io::Write;
+
+/// Print a recipe that is in the program, to keep and change; without a name, list them
+///
+/// `bonepd-ct recipe paper > paper.toml`; `bonepd-ct run paper SCAN -o OUT` takes it as it is.
+#[derive(Args)]
+pub struct RecipeArgs {
+    /// Name of the recipe
+    name: Option<String>,
+}
+
+pub fn run(args: &RecipeArgs) -> Result<Outcome> {
+    let text = match &args.name {
+        Some(name) => built_in(name)?.to_owned(),
+        None => BUILT_IN.map(|(name, text)| line(name, text)).concat(),
+    };
+    let _ = std::io::stdout().write_all(text.as_bytes());
+    Ok(Outcome::Done)
+}
+
+/// The name, and the first line of the recipe's own words.
+fn line(name: &str, text: &str) -> String {
+    let first = text.lines().next().unwrap_or_default();
+    format!("{name:<16} {}\n", first.trim_start_matches(['#', ' ']))
+}

@@ -1,0 +1,152 @@
+//! Owns what became of each scan of a run, and of the run.
+
+use crate::cohort::job::ScanJob;
+use crate::command::estimate::Estimate;
+use crate::command::in_words::answer_in_words;
+use crate::command::{Outcome, adaptive};
+use crate::error::Result;
+use crate::result::answer::{AnswerLine, ScanFacts, best, line};
+use crate::result::row::Row;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// How a scan ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    Done,
+    #[serde(rename = "not converged")]
+    NotConverged,
+    #[serde(rename = "error not met")]
+    ErrorNotMet,
+    Failed,
+    /// In a dry run.
+    Planned,
+}
+
+impl State {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            State::Done => "done",
+            State::NotConverged => "not converged",
+            State::ErrorNotMet => "error not met",
+            State::Failed => "failed",
+            State::Planned => "planned",
+        }
+    }
+}
+
+/// One scan of a run.
+#[derive(Debug, Clone, Serialize)]
+pub struct ScanResult {
+    pub scan: String,
+    pub input: PathBuf,
+    pub state: State,
+    pub error: Option<String>,
+    pub rows: usize,
+    /// None where nothing was solved.
+    pub answer: Option<AnswerLine>,
+    pub estimate: Estimate,
+}
+
+/// The answer, how many rows, and how many of them did not converge.
+pub(super) fn in_words(rows: &[Row]) -> String {
+    let stalled = rows.iter().filter(|row| row.converged() == Some(false));
+    let stalled = match stalled.count() {
+        0 => String::new(),
+        n => format!(", {n} not converged"),
+    };
+    let answer = best(rows).map(|row| answer_in_words(&line(row, &ScanFacts::default())));
+    format!(
+        "{}; {} rows{stalled}",
+        answer.unwrap_or("no modulus".to_owned()),
+        rows.len()
+    )
+}
+
+/// Whether all that was solved is what an earlier run left.
+pub(super) fn said_of_kept(rows: &[Row], before: &[Row]) -> &'static str {
+    let mut solved = rows.iter().filter(|row| !row.key.is_derived()).peekable();
+    let kept = |row: &Row| {
+        before
+            .iter()
+            .any(|old| old.key == row.key && old.solved == row.solved)
+    };
+    match solved.peek().is_some() && solved.all(kept) {
+        true => "  [up to date: kept from an earlier run]",
+        false => "",
+    }
+}
+
+/// `target`: the stated error asked for, if any.
+pub(super) fn result(
+    job: &ScanJob,
+    estimate: Estimate,
+    solved: Option<Result<Vec<Row>>>,
+    target: Option<f64>,
+) -> ScanResult {
+    let missed = |rows: &[Row]| {
+        let broken = rows.iter().all(Row::is_disconnected);
+        target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
+    };
+    let answer = match &solved {
+        Some(Ok(rows)) => best(rows).map(|row| {
+            let facts = ScanFacts {
+                target,
+                ..ScanFacts::default()
+            };
+            line(row, &facts)
+        }),
+        _ => None,
+    };
+    let (state, error, rows) = match solved {
+        Some(Ok(rows)) if missed(&rows) => (State::ErrorNotMet, None, rows.len()),
+        Some(Ok(rows)) if rows.iter().any(|row| row.converged() == Some(false)) => {
+            (State::NotConverged, None, rows.len())
+        }
+        Some(Ok(rows)) => (State::Done, None, rows.len()),
+        Some(Err(e)) => (State::Failed, Some(e.to_string()), 0),
+        None => (State::Planned, None, 0),
+    };
+    ScanResult {
+        scan: job.name.clone(),
+        input: job.input.clone(),
+        state,
+        error,
+        rows,
+        answer,
+        estimate,
+    }
+}
+
+pub(super) fn outcome(results: &[ScanResult]) -> Outcome {
+    let in_state = |state: State| results.iter().filter(move |r| r.state == state);
+    let failed: Vec<String> = in_state(State::Failed).map(|r| r.scan.clone()).collect();
+    let short = [State::NotConverged, State::ErrorNotMet];
+    match (
+        failed.is_empty(),
+        short.into_iter().any(|s| in_state(s).next().is_some()),
+    ) {
+        (false, _) => Outcome::SomeFailed(failed),
+        (true, true) => Outcome::NotConverged,
+        (true, false) => Outcome::Done,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_are_written_in_words() {
+        for state in [
+            State::Done,
+            State::NotConverged,
+            State::ErrorNotMet,
+            State::Failed,
+            State::Planned,
+        ] {
+            assert_eq!(serde_json::to_value(state).unwrap(), state.name());
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Owns the dry run: what each scan would need, without writing anything.
+
+use crate::cohort::job::ScanJob;
+use crate::cohort::outcome::{ScanResult, result};
+use crate::command::estimate::{Estimate, of_specimen};
+use crate::command::segment;
+use crate::machine::host;
+use crate::machine::session::Session;
+use crate::recipe::Recipe;
+use std::path::Path;
+
+/// What would run. Every scan is read and segmented, so what its solves need is known.
+pub(super) fn plan(
+    recipe: &Recipe,
+    jobs: &[ScanJob],
+    estimates: &[Estimate],
+    out: &Path,
+    session: &Session,
+) -> Vec<ScanResult> {
+    let bar = session.bar(jobs.len() as u64, "scans");
+    let mut results = Vec::new();
+    for (job, first) in jobs.iter().zip(estimates) {
+        let to = out.join(&job.name);
+        let quiet = Session {
+            quiet: true,
+            ..session.clone()
+        };
+        let known = segment::in_memory(&job.input, Some(&job.name), &job.segment, &quiet).and_then(
+            |specimen| {
+                let estimate = of_specimen(&specimen, first, recipe)?;
+                Ok(Estimate {
+                    voxels: estimate.voxels.or(Some(specimen.bone.grid.n)),
+                    ..estimate
+                })
+            },
+        );
+        bar.inc(1);
+        let estimate = *known.as_ref().unwrap_or(first);
+        results.push(match &known {
+            Ok(e) => {
+                let (to, from) = (to.display(), job.input.display());
+                session.result(format!("{to} <- {from}: {e}"));
+                result(job, estimate, None, None)
+            }
+            Err(e) => {
+                session.warn(format!("{} would fail: {e}", job.name));
+                result(job, estimate, Some(Err(e.clone())), None)
+            }
+        });
+        if let Some(free) = host::available_mib().filter(|free| *free < estimate.memory_mib) {
+            session.warn(format!("{} will not fit: {free:.0} MiB are free", job.name));
+        }
+    }
+    bar.finish_and_clear();
+    let estimates: Vec<Estimate> = results.iter().map(|r| r.estimate).collect();
+    let seconds = estimates.iter().filter_map(|e| e.time_s).sum::<f64>();
+    let time = match seconds {
+        s if s < 1.0 => "less than 1 s".to_owned(),
+        s if s < 90.0 => format!("{s:.0} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    };
+    let unknown = estimates.iter().filter(|e| e.time_s.is_none()).count();
+    let rest = match unknown {
+        0 => String::new(),
+        n => format!(", and {n} whose time is not known before reading"),
+    };
+    session.result(format!(
+        "scans: {}; about {time} one after the other{rest}",
+        jobs.len()
+    ));
+    results
+}

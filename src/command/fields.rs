@@ -1,0 +1,82 @@
+//! Owns the fields of a solve on disk.
+
+use crate::draw::{field, map};
+use crate::error::Result;
+use crate::export::{vti, vtk};
+use crate::format::orient::{self, Turn};
+use crate::image::nifti;
+use crate::pipeline::apparent::fields::{Recorded, SiteFields};
+use std::path::Path;
+
+/// What was asked for of a solved model.
+pub(super) enum Fields {
+    None,
+    /// Along the specimen's axes, and how those follow from the file's.
+    OfVoxels(Recorded, Turn),
+    /// Name of the lattice, values of its sites.
+    OfSites(String, SiteFields),
+}
+
+impl Fields {
+    /// `stem` names a lattice; `axes` lead from the scan's file to the specimen.
+    pub(super) fn of(stem: String, mut recorded: Recorded, axes: Turn) -> Fields {
+        match recorded.sites.take() {
+            Some(sites) => Fields::OfSites(stem, sites),
+            None => Fields::OfVoxels(recorded, axes),
+        }
+    }
+
+    /// Of voxels `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView; of sites
+    /// `fields-LATTICE.vtk`.
+    pub(super) fn write(&self, dir: &Path) -> Result<()> {
+        match self {
+            Fields::None => Ok(()),
+            Fields::OfVoxels(recorded, axes) => write_voxels(dir, recorded, &axes.inverse()),
+            Fields::OfSites(name, sites) => {
+                vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), name, sites)
+            }
+        }
+    }
+}
+
+/// Mid-slices of a field, for the page.
+fn picture_name(field: &str) -> String {
+    format!("field-{}.png", field.replace('_', "-"))
+}
+
+/// The pictures of fields in a scan's folder, each with its caption.
+pub(super) fn pictures(dir: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names
+        .filter(|name| name.starts_with("field-") && name.ends_with(".png"))
+        .collect();
+    names.sort();
+    let picture = |name: &String| {
+        let field = name.trim_start_matches("field-").trim_end_matches(".png");
+        let caption = format!(
+            "Field {field}, mid-slices of the three planes; colours end where 99 % of the elements do"
+        );
+        Some((caption, std::fs::read(dir.join(name)).ok()?))
+    };
+    names.iter().filter_map(picture).collect()
+}
+
+/// In the order and at the place of the scan's file, to which `back` leads.
+fn write_voxels(dir: &Path, recorded: &Recorded, back: &Turn) -> Result<()> {
+    let mut stored = Vec::new();
+    for one in &recorded.fields {
+        let file = format!("field-{}.nii.gz", one.name.replace('_', "-"));
+        let values = orient::turned(one.values.clone(), back);
+        nifti::write(&dir.join(file), &values)?;
+        stored.push((one.name, values));
+        if let Some(picture) = field::draw(&one.values) {
+            map::write_png(&dir.join(picture_name(one.name)), &picture)?;
+        }
+    }
+    let arrays: Vec<_> = stored
+        .iter()
+        .map(|(name, values)| (*name, values))
+        .collect();
+    vti::write(&dir.join("fields.vti"), &arrays)
+}

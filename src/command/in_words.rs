@@ -1,0 +1,74 @@
+//! Owns the line that the terminal shows of a row.
+
+use crate::result::answer::AnswerLine;
+use crate::result::cautions::WARNING;
+use crate::result::row::Row;
+use crate::result::settings::BoundaryRule;
+
+/// Scan, model, modulus with all of its stated error, cost. Warnings of its note are left out: the terminal has them in lines
+/// of their own.
+pub fn in_words(row: &Row) -> String {
+    let solved = row.solved.clone().unwrap_or_default();
+    let failure = solved.failure.map_or(String::new(), |failure| {
+        format!("  failure load {:.3} N", failure.load_n)
+    });
+    let wall = solved.wall_s.map_or("NA".to_owned(), |t| format!("{t:.2}"));
+    format!(
+        "{} {:<5} {:<12} {:>7} mm  E_app {} {:>9} sites {:>6} iterations {wall:>7} s{failure}{}",
+        row.key.scan,
+        row.key.structure.name(),
+        row.key.boundary.map_or("", BoundaryRule::name),
+        (row.key.lp_mm * 1e6).round() / 1e6,
+        modulus(row),
+        solved.sites.unwrap_or(0),
+        solved.iterations.unwrap_or(0),
+        note(row),
+    )
+}
+
+/// The modulus, with everything that is stated of it and of what that is made.
+fn modulus(row: &Row) -> String {
+    let Some(e_app_mpa) = row.e_app_mpa() else {
+        return "NA".to_owned();
+    };
+    let [algebraic, discretisation] = row.stated_errors_mpa();
+    match (algebraic, discretisation) {
+        (_, Some(d)) => {
+            let all = row.error_mpa().unwrap_or_default();
+            let solver = algebraic.map_or(String::new(), |a| format!("solver {a:.3}, "));
+            format!("{e_app_mpa:.3} ± {all:.3} MPa ({solver}elements and shape {d:.3})")
+        }
+        (Some(a), None) => {
+            format!("{e_app_mpa:.3} MPa (solver ± {a:.3}; the rest is not stated)")
+        }
+        (None, None) => format!("{e_app_mpa:.3} MPa (error not stated)"),
+    }
+}
+
+fn note(row: &Row) -> String {
+    let parts = row.marks.note.as_deref().unwrap_or_default().split("; ");
+    let kept: Vec<&str> = parts
+        .filter(|p| !p.is_empty() && !p.starts_with(WARNING))
+        .collect();
+    match kept.is_empty() {
+        true => String::new(),
+        false => format!("  ({})", kept.join("; ")),
+    }
+}
+
+/// The answer of a scan in a few words.
+pub fn answer_in_words(answer: &AnswerLine) -> String {
+    let e_app = answer.e_app_mpa.unwrap_or(f64::NAN);
+    let error = match (answer.error_mpa, answer.error_percent) {
+        (Some(e), Some(p)) => format!(" ± {e:.3} MPa ({p:.1} %)"),
+        _ => " MPa (error not stated)".to_owned(),
+    };
+    let failure = answer
+        .failure_load_n
+        .map_or(String::new(), |f| format!(", failure load {f:.2} N"));
+    format!(
+        "E_app {e_app:.3}{error} by {} {} mm{failure}",
+        answer.method,
+        (answer.element_mm * 1e6).round() / 1e6
+    )
+}

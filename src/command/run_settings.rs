@@ -1,0 +1,48 @@
+//! Owns what a later `solve` in a run's folder takes from the run: its load, its ends and its tissue.
+
+use crate::command::report::RECIPE;
+use crate::pipeline::apparent::SolveParams;
+use crate::recipe::Recipe;
+use crate::record::specimen;
+use std::path::{Path, PathBuf};
+
+/// Settings of the run that segmented `dir`, and where they stand; None where no run did. Method, resolution and what is to be
+/// recorded stay the defaults.
+pub fn of_run(dir: &Path) -> Option<(PathBuf, SolveParams)> {
+    let dir = dir.canonicalize().ok()?;
+    specimen::record(&dir)?;
+    let path = dir.parent()?.join(RECIPE);
+    let text = std::fs::read_to_string(&path).ok()?;
+    let run = Recipe::parse(&text, &path).ok()?.solve;
+    let params = SolveParams {
+        young_mpa: run.young_mpa,
+        poisson: run.poisson,
+        material: run.material,
+        strain: run.strain,
+        grip_mm: run.grip_mm,
+        load: run.load,
+        ends: run.ends,
+        conditions: run.conditions,
+        axis: run.axis,
+        tolerance: run.tolerance,
+        ..SolveParams::default()
+    };
+    Some((path, params))
+}
+
+/// The settings in a line.
+pub fn in_words(params: &SolveParams) -> String {
+    let tissue = match &params.material {
+        Some(_) => "the tissue's law".to_owned(),
+        None => format!("E {} MPa", params.young_mpa),
+    };
+    format!(
+        "load {}, axis {}, strain {}, grips {} mm, ends {}, {tissue}, ν {}",
+        params.load.name(),
+        params.axis.name(),
+        params.strain,
+        params.grip_mm,
+        params.ends.name(),
+        params.poisson
+    )
+}

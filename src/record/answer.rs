@@ -1,0 +1,112 @@
+//! Owns `answer.json`: the answer of a scan's last solve, of one condition.
+
+use crate::error::Result;
+use crate::io::atomic;
+use crate::result::answer::{AnswerLine, ScanFacts, best, line};
+use crate::result::condition::{Condition, shared};
+use crate::result::row::Row;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+pub const ANSWER: &str = "answer.json";
+
+/// What is written. `error_mpa` is everything that is stated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    pub scan: String,
+    pub e_app_mpa: Option<f64>,
+    pub error_mpa: Option<f64>,
+    /// Relative error asked for.
+    pub target: Option<f64>,
+    pub met: Option<bool>,
+    pub method: String,
+    pub element_mm: f64,
+    /// Load, ends and tissue in words.
+    pub conditions: String,
+    /// Relative change of E_app per relative change of BV.
+    pub threshold_sensitivity: Option<f64>,
+    pub stiffness_n_per_mm: Option<f64>,
+    pub force_n: Option<f64>,
+    /// Of all rows of the condition together.
+    pub wall_s: Option<f64>,
+}
+
+/// The answer of the rows of one command; None where none has a modulus.
+pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
+    let solved: Vec<&Row> = rows
+        .iter()
+        .filter(|row| row.e_app_mpa().is_some())
+        .collect();
+    let condition = shared(&solved)?;
+    let own = || {
+        solved
+            .iter()
+            .filter(|row| Condition::of(&row.key) == condition)
+    };
+    let AnswerLine {
+        scan,
+        e_app_mpa,
+        error_mpa,
+        met,
+        method,
+        element_mm,
+        threshold_sensitivity,
+        stiffness_n_per_mm,
+        force_n,
+        ..
+    } = line(best(own().copied())?, facts);
+    let wall_s = own()
+        .filter(|row| !row.key.is_derived())
+        .filter_map(|row| row.wall_s());
+    Some(Answer {
+        scan,
+        e_app_mpa,
+        error_mpa,
+        target: facts.target,
+        met,
+        method,
+        element_mm,
+        conditions: format!(
+            "{} {}",
+            condition.load_in_words(),
+            condition.tissue_in_words()
+        ),
+        threshold_sensitivity,
+        stiffness_n_per_mm,
+        force_n,
+        wall_s: Some(wall_s.sum()),
+    })
+}
+
+/// Writes `answer.json`, whole or not at all.
+pub fn write(dir: &Path, answer: &Answer) -> Result<()> {
+    let text = serde_json::to_string_pretty(answer).expect("plain data");
+    atomic::write(&dir.join(ANSWER), text + "\n")
+}
+
+/// What the last solve in `dir` left; None where there is nothing of this version.
+pub fn read(dir: &Path) -> Option<Answer> {
+    serde_json::from_slice(&std::fs::read(dir.join(ANSWER)).ok()?).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::result::row::Solution;
+
+    #[test]
+    fn an_answer_survives_writing_and_no_modulus_has_none() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut row = Row::default();
+        assert_eq!(answer(&[row.clone()], &ScanFacts::default()), None);
+        row.solved = Some(Solution {
+            e_app_mpa: Some(1.0 / 3.0),
+            wall_s: Some(0.5),
+            ..Solution::default()
+        });
+        let found = answer(&[row], &ScanFacts::default()).unwrap();
+        assert_eq!((found.wall_s, found.error_mpa), (Some(0.5), None));
+        write(dir.path(), &found).unwrap();
+        assert_eq!(read(dir.path()), Some(found));
+    }
+}

@@ -1,0 +1,260 @@
+//! Owns the answers of a report: one line a scan, what they have in common, and what is left out.
+
+use crate::report::cells::{Cell, Table, length, link, number, text, with_error};
+use crate::report::distinct;
+use crate::result::answer;
+use crate::result::answer::{AnswerLine, ScanFacts};
+use crate::result::condition::{Condition, shared};
+use crate::result::row::Row;
+use serde::Serialize;
+
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Answers {
+    pub lines: Vec<AnswerLine>,
+    /// Load and tissue in sentences; what the methods of the answers are.
+    pub conditions: Vec<String>,
+    /// Rows and scans that differ from the conditions, in words.
+    pub left_out: Vec<String>,
+    /// Scans of other conditions: in no comparison.
+    pub apart: Vec<String>,
+}
+
+/// The answers of `rows`; `facts` has what is known of a scan.
+pub fn answers(rows: &[Row], facts: impl Fn(&str) -> ScanFacts) -> Answers {
+    let solved: Vec<&Row> = rows.iter().filter(|r| r.e_app_mpa().is_some()).collect();
+    let Some(condition) = shared(&solved) else {
+        return Answers::default();
+    };
+    let lines = answer::answers(rows, &condition, facts);
+    let mut left_out = Vec::new();
+    let mut apart = Vec::new();
+    for line in &lines {
+        let own = solved.iter().filter(|row| row.key.scan == line.scan);
+        let all = distinct(own.map(|row| Condition::of(&row.key)));
+        let others: Vec<String> = all
+            .iter()
+            .filter(|c| **c != condition)
+            .map(|c| c.difference(&condition))
+            .collect();
+        if !all.contains(&condition) {
+            apart.push(line.scan.clone());
+            left_out.push(format!(
+                "{} was solved under other conditions only ({}): in no comparison",
+                line.scan,
+                others.join("; ")
+            ));
+        } else if !others.is_empty() {
+            left_out.push(format!(
+                "{} has rows of other conditions too, which are not its answer ({})",
+                line.scan,
+                others.join("; ")
+            ));
+        }
+    }
+    let mut conditions = vec![condition.load_in_words(), condition.tissue_in_words()];
+    conditions.extend(methods_in_words(&lines));
+    Answers {
+        lines,
+        conditions,
+        left_out,
+        apart,
+    }
+}
+
+/// What each method of the answers is, in plain words.
+fn methods_in_words(lines: &[AnswerLine]) -> Vec<String> {
+    distinct(lines.iter().map(|line| line.method.as_str()))
+        .into_iter()
+        .map(|method| format!("{}: {}.", method_words(method), explained(method)))
+        .collect()
+}
+
+/// How a modulus was found, as a reader says it.
+pub fn method_words(method: &str) -> &str {
+    match method {
+        "ffb" => "FFB mean",
+        "graded" => "graded lattice",
+        "floppy" => "floppy lattice",
+        "firm" => "firm lattice",
+        "voxel-fe" => "voxel FE",
+        "graded-extrapolated" => "graded lattices, extrapolated",
+        "voxel-fe-extrapolated" => "voxel FE, extrapolated",
+        other => other,
+    }
+}
+
+fn explained(method: &str) -> &'static str {
+    match method {
+        "floppy" => {
+            "a lattice of springs whose sites lie in bone only; too soft while struts are a few sites thick"
+        }
+        "firm" => {
+            "a lattice of springs padded by one layer of sites around the bone; too stiff while struts are a few sites thick"
+        }
+        "ffb" => {
+            "the mean of the floppy lattice (sites in bone only, too soft) and the firm one (padded by a layer, too stiff) of one lattice parameter; ± is half the gap between them, a bracket rather than a likely error"
+        }
+        "graded" => {
+            "a lattice of springs whose stiffness follows the share of bone in each cell; one resolution states no discretisation error"
+        }
+        "voxel-fe" => {
+            "one hexahedral element a voxel; ± holds what voxels of this size do to struts of this thickness"
+        }
+        "graded-extrapolated" => {
+            "the limit of graded lattices (stiffness follows the share of bone in each cell) of several lattice parameters"
+        }
+        "voxel-fe-extrapolated" => "the limit of hexahedral elements of two sizes",
+        _ => "see the solves",
+    }
+}
+
+/// The first table of the page.
+pub fn table(answers: &Answers) -> Table {
+    let head = [
+        "scan",
+        "subject",
+        "group",
+        "BV/TV",
+        "E_app ± error (MPa)",
+        "error (%)",
+        "error asked for",
+        "how",
+        "LP or element (mm)",
+        "conditions",
+        "stiffness (N/mm)",
+        "force (N)",
+        "failure load (N)",
+        "yield stress (MPa)",
+    ];
+    let body = answers.lines.iter().map(|line| cells(line, answers));
+    Table::new(&head, body.collect()).without_empty_columns()
+}
+
+fn cells(line: &AnswerLine, answers: &Answers) -> Vec<Cell> {
+    let words = |word: &Option<String>| text(word.as_deref().unwrap_or(""));
+    let met = match line.met {
+        Some(true) => "met",
+        Some(false) => "not met",
+        None => "",
+    };
+    vec![
+        link(&line.scan),
+        words(&line.subject),
+        words(&line.group),
+        number(Some(line.bv_tv)),
+        with_error(line.e_app_mpa, line.error_mpa),
+        percent(line),
+        text(met),
+        text(method_words(&line.method)),
+        length(line.element_mm),
+        text(match answers.apart.contains(&line.scan) {
+            true => "others (see notes)",
+            false => "",
+        }),
+        number(line.stiffness_n_per_mm),
+        number(line.force_n),
+        number(line.failure_load_n),
+        number(line.yield_stress_mpa),
+    ]
+}
+
+fn percent(line: &AnswerLine) -> Cell {
+    match line.error_percent {
+        Some(p) => Cell {
+            text: format!("{p:.1}"),
+            ..number(Some(p))
+        },
+        None => text("not stated"),
+    }
+}
+
+/// Answers that can be compared: of the shared conditions, with a modulus above 0. The others are named.
+pub fn comparable(answers: &Answers) -> (Vec<&AnswerLine>, Vec<String>) {
+    let mut notes = Vec::new();
+    let mut kept = Vec::new();
+    for line in &answers.lines {
+        if answers.apart.contains(&line.scan) {
+            continue;
+        }
+        match line.e_app_mpa {
+            Some(e) if e > 0.0 => kept.push(line),
+            _ => notes.push(format!(
+                "{} carries no load (E_app 0): left out of groups and figures",
+                line.scan
+            )),
+        }
+    }
+    (kept, notes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::result::row::Solution;
+    use crate::result::settings::{BoundaryRule, Settings};
+
+    fn row(scan: &str, grip_mm: f64, e: f64) -> Row {
+        Row {
+            key: Settings {
+                scan: scan.to_owned(),
+                boundary: Some(BoundaryRule::Ffb),
+                young_mpa: 1000.0,
+                strain: -0.01,
+                grip_mm,
+                lp_mm: 0.1,
+                ..Settings::default()
+            },
+            solved: Some(Solution {
+                e_app_mpa: Some(e),
+                discretization_error_mpa: Some(0.5 * e),
+                ..Solution::default()
+            }),
+            ..Row::default()
+        }
+    }
+
+    #[test]
+    fn a_scan_of_other_conditions_is_named_and_not_compared() {
+        let rows = [
+            row("a", 0.0, 10.0),
+            row("b", 0.0, 20.0),
+            row("c", 0.6, 90.0),
+            row("d", 0.0, 0.0),
+        ];
+        let found = answers(&rows, |_| ScanFacts::default());
+        assert_eq!(found.lines.len(), 4);
+        assert_eq!(found.apart, ["c"]);
+        assert!(
+            found.left_out[0].contains("grips of 0.6 mm"),
+            "{:?}",
+            found.left_out
+        );
+        let (kept, notes) = comparable(&found);
+        let names: Vec<&str> = kept.iter().map(|a| a.scan.as_str()).collect();
+        assert_eq!(names, ["a", "b"]);
+        assert!(notes[0].starts_with("d carries no load"));
+        assert!(
+            found.conditions[1].contains("1000 MPa"),
+            "{:?}",
+            found.conditions
+        );
+        assert!(
+            found.conditions[2].starts_with("FFB mean"),
+            "{:?}",
+            found.conditions
+        );
+    }
+
+    #[test]
+    fn the_table_has_one_plus_minus() {
+        let found = answers(&[row("a", 0.0, 10.0)], |_| ScanFacts::default());
+        let table = table(&found);
+        let at = table
+            .head
+            .iter()
+            .position(|h| h.starts_with("E_app"))
+            .unwrap();
+        assert_eq!(table.body[0][at].text, "10.0 ± 5.0");
+        assert!(!table.head.iter().any(|h| h == "failure load (N)"));
+    }
+}

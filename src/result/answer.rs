@@ -1,0 +1,283 @@
+//! Owns the answer of a scan: of the rows of one condition the one of the least stated error, as a line of `answers.csv`.
+
+use crate::result::condition::Condition;
+use crate::result::notes;
+use crate::result::row::Row;
+use crate::result::settings::{BoundaryRule, Load, Method};
+use serde::{Deserialize, Serialize};
+
+/// One line of `answers.csv`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(default)]
+pub struct AnswerLine {
+    pub scan: String,
+    pub subject: Option<String>,
+    pub group: Option<String>,
+    pub bv_tv: f64,
+    pub e_app_mpa: Option<f64>,
+    /// All that is stated; None where the resolution's error is not.
+    pub error_mpa: Option<f64>,
+    pub error_percent: Option<f64>,
+    /// None where no error was asked for.
+    pub met: Option<bool>,
+    pub method: String,
+    pub element_mm: f64,
+    pub young_mpa: f64,
+    pub poisson: f64,
+    pub load: String,
+    pub ends: String,
+    pub axis: String,
+    pub grip_mm: f64,
+    pub stiffness_n_per_mm: Option<f64>,
+    pub force_n: Option<f64>,
+    pub failure_load_n: Option<f64>,
+    pub yield_stress_mpa: Option<f64>,
+    pub threshold_sensitivity: Option<f64>,
+    pub note: Option<String>,
+}
+
+/// What is known of a scan beside its rows.
+#[derive(Debug, Clone, Default)]
+pub struct ScanFacts {
+    /// Of the volume along x, y, z.
+    pub size_mm: Option<[f64; 3]>,
+    /// Relative error asked for.
+    pub target: Option<f64>,
+    pub threshold_sensitivity: Option<f64>,
+    /// Of the segmentation.
+    pub warnings: Vec<String>,
+}
+
+/// Order in which rows are answers: connected before not, converged before not, then the least stated error; among rows
+/// that state none the more exact method, then the finer.
+fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
+    let exactness = match (row.key.method, row.key.boundary) {
+        (_, Some(BoundaryRule::Extrapolated)) => 0,
+        (Method::VoxelFe, _) => 1,
+        (_, Some(BoundaryRule::GRADED)) => 2,
+        (_, Some(BoundaryRule::Ffb)) => 3,
+        _ => 4,
+    };
+    (
+        row.is_disconnected(),
+        row.converged() == Some(false),
+        row.error().unwrap_or(f64::INFINITY),
+        exactness,
+        row.key.lp_mm,
+    )
+}
+
+/// The row that answers; None where none has a modulus.
+pub fn best<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<&'a Row> {
+    let order = |a: &&Row, b: &&Row| {
+        let (a, b) = (rank(a), rank(b));
+        let places = (a.0, a.1).cmp(&(b.0, b.1));
+        places
+            .then(a.2.total_cmp(&b.2))
+            .then(a.3.cmp(&b.3))
+            .then(a.4.total_cmp(&b.4))
+    };
+    let solved = rows.into_iter().filter(|row| row.e_app_mpa().is_some());
+    solved.min_by(order)
+}
+
+/// A word for how a modulus was found.
+pub fn method_name(row: &Row) -> String {
+    let of_voxels = row.key.method == Method::VoxelFe;
+    match row.key.boundary {
+        Some(BoundaryRule::Extrapolated) if of_voxels => "voxel-fe-extrapolated".to_owned(),
+        Some(BoundaryRule::Extrapolated) => "graded-extrapolated".to_owned(),
+        Some(boundary) => boundary.name().to_owned(),
+        None => row.key.method.name().to_owned(),
+    }
+}
+
+/// Force at the strain applied, a magnitude, and stiffness of the specimen between its loaded ends: `F = E A ε`,
+/// `K = E A / L`. None for a stiffness matrix, or where the size is not known.
+fn force_and_stiffness(row: &Row, facts: &ScanFacts) -> Option<[f64; 2]> {
+    let key = &row.key;
+    let height_mm = facts.size_mm?[key.axis.index()];
+    let gauge_mm = height_mm - 2.0 * key.grip_mm;
+    (key.load != Load::Stiffness && gauge_mm > 0.0).then_some(())?;
+    let e_times_area = row.e_app_mpa()? * key.tv_mm3 / height_mm;
+    Some([e_times_area * key.strain.abs(), e_times_area / gauge_mm])
+}
+
+/// The line of a row.
+pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
+    let key = &row.key;
+    let error = row.error_mpa();
+    let forces = force_and_stiffness(row, facts);
+    let mut note = row.marks.note.clone();
+    for warning in &facts.warnings {
+        notes::add(&mut note, &format!("warning: {warning}"));
+    }
+    let relative = match row.is_disconnected() {
+        true => Some(0.0),
+        false => row.error(),
+    };
+    AnswerLine {
+        scan: key.scan.clone(),
+        subject: row.marks.subject.clone(),
+        group: row.marks.group.clone(),
+        bv_tv: key.bv_tv,
+        e_app_mpa: row.e_app_mpa(),
+        error_mpa: error,
+        error_percent: relative.map(|e| 100.0 * e),
+        met: facts
+            .target
+            .map(|target| relative.is_some_and(|e| e <= target)),
+        method: method_name(row),
+        element_mm: key.lp_mm,
+        young_mpa: key.young_mpa,
+        poisson: key.poisson,
+        load: key.load.name().to_owned(),
+        ends: key.supports.name().to_owned(),
+        axis: key.axis.name().to_owned(),
+        grip_mm: key.grip_mm,
+        stiffness_n_per_mm: forces.map(|[_, k]| k),
+        force_n: forces.map(|[f, _]| f),
+        failure_load_n: row
+            .solved
+            .as_ref()
+            .and_then(|s| s.failure)
+            .map(|f| f.load_n),
+        yield_stress_mpa: None,
+        threshold_sensitivity: facts.threshold_sensitivity,
+        note,
+    }
+}
+
+/// One line a scan, in the order of the rows: of `condition` where a scan has it, else of its last. The failure load is
+/// that of any row of the same condition.
+pub fn answers(
+    rows: &[Row],
+    condition: &Condition,
+    facts: impl Fn(&str) -> ScanFacts,
+) -> Vec<AnswerLine> {
+    let mut scans: Vec<&str> = Vec::new();
+    for row in rows {
+        if !scans.contains(&row.key.scan.as_str()) {
+            scans.push(&row.key.scan);
+        }
+    }
+    let answer = |scan: &str| {
+        let of_scan = || rows.iter().filter(move |row| row.key.scan == scan);
+        let has = |c: &Condition| {
+            of_scan().any(|r| Condition::of(&r.key) == *c && r.e_app_mpa().is_some())
+        };
+        let last = of_scan().last().map(|row| Condition::of(&row.key))?;
+        let used = if has(condition) { condition } else { &last };
+        let own: Vec<&Row> = of_scan()
+            .filter(|r| Condition::of(&r.key) == *used)
+            .collect();
+        let mut answer = line(best(own.iter().copied())?, &facts(scan));
+        let failure = own.iter().filter_map(|r| r.solved.as_ref()?.failure);
+        answer.failure_load_n = answer.failure_load_n.or(failure.last().map(|f| f.load_n));
+        Some(answer)
+    };
+    scans.into_iter().filter_map(answer).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::result::row::Solution;
+    use crate::result::settings::Settings;
+
+    fn row(scan: &str, boundary: Option<BoundaryRule>, e: f64, error: Option<f64>) -> Row {
+        Row {
+            key: Settings {
+                scan: scan.to_owned(),
+                method: match boundary {
+                    None => Method::VoxelFe,
+                    Some(_) => Method::Lattice,
+                },
+                boundary,
+                lp_mm: 0.1,
+                tv_mm3: 8.0,
+                strain: -0.01,
+                ..Settings::default()
+            },
+            solved: Some(Solution {
+                e_app_mpa: Some(e),
+                algebraic_error_mpa: Some(0.1),
+                discretization_error_mpa: error,
+                converged: Some(true),
+                ..Solution::default()
+            }),
+            ..Row::default()
+        }
+    }
+
+    fn answer_of(rows: &[Row]) -> AnswerLine {
+        let condition = Condition::of(&rows[0].key);
+        let facts = |_: &str| ScanFacts {
+            size_mm: Some([2.0; 3]),
+            target: Some(0.05),
+            ..ScanFacts::default()
+        };
+        answers(rows, &condition, facts).remove(0)
+    }
+
+    #[test]
+    fn the_least_stated_error_answers() {
+        let limit = row("a", Some(BoundaryRule::Extrapolated), 50.0, Some(1.9));
+        let rows = [
+            row("a", Some(BoundaryRule::FLOPPY), 20.0, None),
+            row("a", Some(BoundaryRule::Ffb), 60.0, Some(40.0)),
+            row("a", None, 55.0, Some(9.0)),
+            limit,
+        ];
+        let a = answer_of(&rows);
+        assert_eq!(
+            (a.e_app_mpa, a.error_mpa, a.met),
+            (Some(50.0), Some(2.0), Some(true))
+        );
+        assert_eq!(
+            (a.method.as_str(), a.error_percent),
+            ("graded-extrapolated", Some(4.0))
+        );
+        // 4 mm², 1 %, 2 mm.
+        assert_eq!((a.force_n, a.stiffness_n_per_mm), (Some(2.0), Some(100.0)));
+        assert_eq!(answer_of(&rows[..3]).method, "voxel-fe");
+        // No error is stated: none is said.
+        let a = answer_of(&rows[..1]);
+        assert_eq!(
+            (a.e_app_mpa, a.error_mpa, a.met),
+            (Some(20.0), None, Some(false))
+        );
+    }
+
+    #[test]
+    fn what_carries_no_load_answers_only_where_all_rows_do() {
+        let broken = row("a", Some(BoundaryRule::FLOPPY), 0.0, None);
+        let graded = row("a", Some(BoundaryRule::GRADED), 3.0, None);
+        assert_eq!(answer_of(&[broken.clone(), graded]).method, "graded");
+        let alone = answer_of(&[broken]);
+        assert_eq!(
+            (alone.e_app_mpa, alone.error_mpa, alone.met),
+            (Some(0.0), Some(0.0), Some(true))
+        );
+    }
+
+    #[test]
+    fn a_row_that_is_not_converged_comes_last() {
+        let mut stopped = row("a", None, 50.0, Some(0.1));
+        stopped.solved.as_mut().unwrap().converged = Some(false);
+        let rows = [stopped, row("a", Some(BoundaryRule::GRADED), 40.0, None)];
+        assert_eq!(answer_of(&rows).method, "graded");
+    }
+
+    #[test]
+    fn a_scan_without_the_shared_condition_has_its_own() {
+        let mut other = row("b", None, 9.0, Some(0.1));
+        other.key.grip_mm = 0.6;
+        let rows = [row("a", None, 5.0, Some(0.1)), other];
+        let found = answers(&rows, &Condition::of(&rows[0].key), |_| {
+            ScanFacts::default()
+        });
+        let grips: Vec<f64> = found.iter().map(|a| a.grip_mm).collect();
+        assert_eq!(grips, [0.0, 0.6]);
+    }
+}

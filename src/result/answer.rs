@@ -166,14 +166,16 @@ pub fn answers(
         let has = |c: &Condition| {
             of_scan().any(|r| Condition::of(&r.key) == *c && r.e_app_mpa().is_some())
         };
-        let last = of_scan().last().map(|row| Condition::of(&row.key))?;
+        let last = of_scan().next_back().map(|row| Condition::of(&row.key))?;
         let used = if has(condition) { condition } else { &last };
         let own: Vec<&Row> = of_scan()
             .filter(|r| Condition::of(&r.key) == *used)
             .collect();
         let mut answer = line(best(own.iter().copied())?, &facts(scan));
-        let failure = own.iter().filter_map(|r| r.solved.as_ref()?.failure);
-        answer.failure_load_n = answer.failure_load_n.or(failure.last().map(|f| f.load_n));
+        let mut failure = own.iter().filter_map(|r| r.solved.as_ref()?.failure);
+        answer.failure_load_n = answer
+            .failure_load_n
+            .or(failure.next_back().map(|f| f.load_n));
         Some(answer)
     };
     scans.into_iter().filter_map(answer).collect()

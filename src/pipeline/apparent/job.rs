@@ -28,6 +28,7 @@ pub struct Job {
 }
 
 /// What a solve came to.
+#[allow(clippy::large_enum_variant)] // one value a solve, moved once
 pub enum JobResult {
     /// Of one load.
     Modulus(Solved, Recorded),
@@ -112,9 +113,8 @@ fn solve<D: Discretisation>(
     observe: &mut Observe,
 ) -> Result<JobResult> {
     if params.load == Load::Stiffness {
-        return Ok(JobResult::Stiffness(stiffness::<D>(
-            case, prepared, params, observe,
-        )?));
+        let solved = stiffness::<D>(case, prepared, params, observe)?;
+        return Ok(JobResult::Stiffness(solved));
     }
     let model = D::build(case, prepared, params)?;
     let system = model.system(LoadSet::Compression);

@@ -75,7 +75,15 @@ fn done(command: &mut Command) -> String {
 #[ignore = "builds a patched copy of the project: 5 to 20 minutes"]
 fn a_new_discretisation_builds_obeys_the_laws_and_solves() {
     let dir = tempfile::tempdir().unwrap();
-    let copied = ["Cargo.toml", "Cargo.lock", "src", "tests", "README.md"];
+    let copied = [
+        "Cargo.toml",
+        "Cargo.lock",
+        "src",
+        "tests",
+        "pipelines",
+        "reports",
+        "README.md",
+    ];
     for name in copied {
         copy(&root().join(name), &dir.path().join(name));
     }

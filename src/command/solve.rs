@@ -74,7 +74,6 @@ impl OpenScan {
     /// # Errors
     /// A folder that is not a segmented scan, a material that does not fit it.
     pub fn open(dir: &Path, params: &SolveParams, redo: bool, session: &Session) -> Result<Self> {
-        params.check()?;
         if !session.dry_run {
             atomic::sweep(dir);
         }

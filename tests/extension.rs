@@ -48,6 +48,13 @@ fn a_new_discretisation_is_one_file_an_arm_with_its_word_and_a_row_of_laws() {
         lines('+') - own
     );
     assert!(lines('-') <= 2);
+    // Where git is not installed, the other test says whether the patch applies.
+    let mut git = Command::new("git");
+    let check = git.args(["apply", "--check", "tests/one_point.patch"]);
+    if let Ok(out) = check.current_dir(root()).output() {
+        let words = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.success(), "{words}");
+    }
 }
 
 fn copy(from: &Path, to: &Path) {

@@ -106,8 +106,11 @@ fn holds_results(folder: &Path) -> bool {
     RESULTS.iter().any(|name| folder.join(name).is_file())
 }
 
+/// A folder of results with no scan beside them.
 fn refuse_results(input: &Path) -> Result<()> {
-    match input.is_dir() && holds_results(input) {
+    let has_scans =
+        || listing(input).is_ok_and(|files| files.iter().any(|f| scan::is_scan_file(f)));
+    match input.is_dir() && holds_results(input) && !has_scans() {
         true => Err(Error::file(
             input,
             "is a folder of results, where a scan was expected",

@@ -138,7 +138,7 @@ const ANSWERS: [Column; 22] = [
     column("note", "", "what a reader must know of this number"),
 ];
 
-const RESULTS: [Column; 43] = [
+const RESULTS: [Column; 47] = [
     SCAN,
     column("method", "", "lattice or voxel-fe"),
     column(
@@ -253,6 +253,26 @@ const RESULTS: [Column; 43] = [
         "da",
         "",
         "DA: degree of anisotropy by mean intercept lengths, 1 is isotropic",
+    ),
+    column(
+        "elements",
+        "",
+        "what voxel elements follow from: voxels, interpolated-grey, smoothed-grey, split-voxels, block-means, bone-fractions",
+    ),
+    column(
+        "shape_error_mpa",
+        "MPa",
+        "what voxels and the scan's blur leave open about the bone's surface",
+    ),
+    column(
+        "error_mpa",
+        "MPa",
+        "all that is stated of e_app_mpa: algebraic, discretisation and shape error",
+    ),
+    column(
+        "threshold_sensitivity",
+        "",
+        "relative change of E_app per relative change of bone volume",
     ),
 ];
 

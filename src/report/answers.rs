@@ -206,7 +206,8 @@ mod tests {
             },
             solved: Some(Solution {
                 e_app_mpa: Some(e),
-                discretization_error_mpa: Some(0.5 * e),
+                discretization_error_mpa: Some(0.3 * e),
+                shape_error_mpa: Some(0.2 * e),
                 ..Solution::default()
             }),
             ..Row::default()

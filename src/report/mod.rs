@@ -116,7 +116,11 @@ fn warnings(rows: &[Row], answers: &Answers) -> Vec<String> {
         add(line.note.as_deref(), &line.scan);
     }
     for row in rows {
-        add(row.marks.note.as_deref(), &row.key.scan);
+        let note = row.marks.note.as_deref();
+        add(note, &row.key.scan);
+        if row.converged() == Some(false) && note.is_none() {
+            add(Some("not converged"), &row.key.scan);
+        }
     }
     let all = answers.lines.len();
     found.groups().map(|group| in_words(group, all)).collect()

@@ -70,6 +70,7 @@ pub(in super::super) mod cases {
                 solved: Some(Solution {
                     e_app_mpa: Some(e),
                     discretization_error_mpa: Some(error * e),
+                    shape_error_mpa: Some(0.0),
                     ..Solution::default()
                 }),
                 ..first

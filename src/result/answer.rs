@@ -205,6 +205,7 @@ mod tests {
                 e_app_mpa: Some(e),
                 algebraic_error_mpa: Some(0.1),
                 discretization_error_mpa: error,
+                shape_error_mpa: error.map(|_| 0.0),
                 converged: Some(true),
                 ..Solution::default()
             }),

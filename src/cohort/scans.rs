@@ -106,10 +106,14 @@ fn holds_results(folder: &Path) -> bool {
     RESULTS.iter().any(|name| folder.join(name).is_file())
 }
 
+/// A file that is a scan, and none that this program left.
+fn is_scan(file: &Path) -> bool {
+    scan::is_scan_file(file) && !own_files::is_result(file)
+}
+
 /// A folder of results with no scan beside them.
 fn refuse_results(input: &Path) -> Result<()> {
-    let has_scans =
-        || listing(input).is_ok_and(|files| files.iter().any(|f| scan::is_scan_file(f)));
+    let has_scans = || listing(input).is_ok_and(|files| files.iter().any(|f| is_scan(f)));
     match input.is_dir() && holds_results(input) && !has_scans() {
         true => Err(Error::file(
             input,

@@ -23,7 +23,7 @@ fn table(source: &str) -> Vec<(String, Use)> {
     let found: Vec<(String, Use)> = rows
         .filter_map(|row| {
             let mut cells = row.split('|').map(str::trim);
-            let key = cells.next()?.to_string();
+            let key = cells.next()?.replace('\\', "");
             let used = match cells.next()? {
                 "read" => Use::Read,
                 "refused" => Use::Refused,

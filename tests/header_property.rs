@@ -145,9 +145,8 @@ fn hold_within(
             );
         }
     }
-    for a in 0..3 {
+    for (a, edge) in volume.grid.spacing_mm.into_iter().enumerate() {
         let norm = (0..3).map(|r| rows[r][a].powi(2)).sum::<f64>().sqrt();
-        let edge = volume.grid.spacing_mm[a];
         prop_assert!((norm / edge - 1.0).abs() < 1e-4, "{norm} {edge}");
         prop_assert!(rows[a][a] > 0.0, "axis {a} runs backwards");
     }

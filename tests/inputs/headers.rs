@@ -427,7 +427,10 @@ fn npy(cases: u32, seed: u64) {
     );
 }
 
-const FORMATS: [(&str, fn(u32, u64)); 4] = [
+/// Writes and reads so many files of one format, from a seed.
+type Property = fn(u32, u64);
+
+const FORMATS: [(&str, Property); 4] = [
     ("TIFF", plain_tiff),
     ("ImageJ", imagej),
     ("OME-TIFF", ome),

@@ -53,8 +53,11 @@ fn turns() -> Vec<Turn> {
         .collect()
 }
 
+/// Values of the scan, of the mask, and notes.
+type Laid = (Vec<f32>, Vec<f32>, Vec<String>);
+
 /// What a mask of these stored values is on the scan.
-fn lay(scan: &Path, mask: &Path) -> Result<(Vec<f32>, Vec<f32>, Vec<String>), String> {
+fn lay(scan: &Path, mask: &Path) -> Result<Laid, String> {
     let scan = scan::read(scan, None).unwrap();
     let mut notes = Vec::new();
     let mask = laid::on(&scan, mask, &mut notes).map_err(|e| e.to_string())?;

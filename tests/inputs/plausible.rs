@@ -9,7 +9,7 @@ use std::path::Path;
 /// Air about −900, bone about 900 in a quarter, of noise of 40 to either side; 24³ voxels.
 fn grey(i: usize) -> f32 {
     let noise = ((i * 7919) % 81) as f32 - 40.0;
-    if i / 24 % 4 == 0 {
+    if (i / 24).is_multiple_of(4) {
         900.0 + noise
     } else {
         -900.0 + noise

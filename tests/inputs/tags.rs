@@ -23,8 +23,11 @@ fn short(n: u16) -> Value {
     Value::Short(vec![n])
 }
 
+/// Whether what was read shows a change.
+type Seen = fn(Result<Stored, String>) -> bool;
+
 /// A change that only this tag makes, and what has to be seen of it.
-fn effect(tag: u16) -> Option<(Vec<Page>, fn(Result<Stored, String>) -> bool)> {
+fn effect(tag: u16) -> Option<(Vec<Page>, Seen)> {
     let tagged = |value| plain().with(tag, value);
     let one = |page: Page| vec![page];
     Some(match tag {

@@ -242,7 +242,7 @@ fn chunks(page: &Page, order: Order) -> Vec<Vec<u8>> {
 
 fn row(values: &[u64], page: &Page, order: Order) -> Vec<u8> {
     let bytes = page.bits / 8;
-    if page.bits % 8 != 0 {
+    if !page.bits.is_multiple_of(8) {
         let mut bits: Vec<bool> = values
             .iter()
             .flat_map(|v| (0..page.bits).rev().map(move |b| v >> b & 1 == 1))

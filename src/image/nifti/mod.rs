@@ -48,10 +48,10 @@
 //! | intent_name | harmless | any text |
 //! | magic | read | one piece, a pair of files, or Analyze |
 //! | extension | harmless | skipped: vox_offset says where voxels begin |
-//! | [vox_units] | read | Analyze's unit of length |
-//! | [funused1] | read | SPM's scale factor; 0 means none |
-//! | [orient] | refused | other planes than 0, which Analyze's programs read differently |
-//! | [originator] | harmless | place of SPM's origin |
+//! | \[vox_units\] | read | Analyze's unit of length |
+//! | \[funused1\] | read | SPM's scale factor; 0 means none |
+//! | \[orient\] | refused | other planes than 0, which Analyze's programs read differently |
+//! | \[originator\] | harmless | place of SPM's origin |
 
 mod header;
 mod place;

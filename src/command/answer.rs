@@ -12,8 +12,7 @@ use std::path::Path;
 pub fn facts(dir: &Path) -> ScanFacts {
     let last = answer::read(dir);
     ScanFacts {
-        target: last.as_ref().and_then(|a| a.target),
-        threshold_sensitivity: last.and_then(|a| a.threshold_sensitivity),
+        target: last.and_then(|a| a.target),
         ..specimen::record(dir).map_or_else(ScanFacts::default, |record| of_record(&record))
     }
 }
@@ -35,7 +34,6 @@ fn of_record(record: &SegmentRecord) -> ScanFacts {
 pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answer>> {
     let facts = ScanFacts {
         target,
-        threshold_sensitivity: None,
         ..facts(dir)
     };
     let answer = answer::answer(rows, &facts);

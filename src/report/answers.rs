@@ -92,18 +92,20 @@ fn explained(method: &str) -> &'static str {
             "a lattice of springs padded by one layer of sites around the bone; too stiff while struts are a few sites thick"
         }
         "ffb" => {
-            "the mean of the floppy lattice (sites in bone only, too soft) and the firm one (padded by a layer, too stiff) of one lattice parameter; ± is half the gap between them, a bracket rather than a likely error"
+            "the mean of the floppy lattice (sites in bone only, too soft) and the firm one (padded by a layer, too stiff) of one lattice parameter; ± is half the gap between them, and what the image leaves open about the surface"
         }
         "graded" => {
-            "a lattice of springs whose stiffness follows the share of bone in each cell; one resolution states no discretisation error"
+            "a lattice of springs that goes with the bone in each cell: a site for every connected component (SC), or sites weighted by bone fraction (BCC, FCC); one lattice parameter states no discretisation error"
         }
         "voxel-fe" => {
-            "one hexahedral element a voxel; ± holds what voxels of this size do to struts of this thickness"
+            "hexahedral elements; ± holds what elements of this size and the image leave open about struts of this thickness"
         }
         "graded-extrapolated" => {
-            "the limit of graded lattices (stiffness follows the share of bone in each cell) of several lattice parameters"
+            "the limit of such lattices (a site for every connected component of bone in a cell, or sites weighted by bone fraction) of several lattice parameters"
         }
-        "voxel-fe-extrapolated" => "the limit of hexahedral elements of two sizes",
+        "voxel-fe-extrapolated" => {
+            "the limit of hexahedral elements of two sizes: that of the voxel staircase, not of the bone; no error is stated"
+        }
         _ => "see the solves",
     }
 }

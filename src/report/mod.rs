@@ -19,7 +19,7 @@ pub mod table;
 use crate::result::cautions::WARNING;
 use crate::result::notes::{Alike, Alikes};
 use crate::result::row::Row;
-use crate::result::settings::{BoundaryRule, Method};
+use crate::result::settings::{BoundaryRule, Elements, Method};
 use answers::Answers;
 use figure::Figure;
 use groups::Groups;
@@ -196,8 +196,12 @@ impl Model {
         Model::VoxelFeLimit,
     ];
 
-    /// None for a method without a column: its rows stand in the table of results alone.
+    /// None for a method without a column, and for elements of a smoother image, which answer nothing: their rows stand in the
+    /// table of results alone.
     pub fn of(row: &Row) -> Option<Model> {
+        if row.key.elements == Some(Elements::SmoothedGrey) {
+            return None;
+        }
         Some(match (row.key.boundary, row.key.method) {
             (Some(BoundaryRule::Floppy), _) => Model::Floppy,
             (Some(BoundaryRule::Firm), _) => Model::Firm,

@@ -3,7 +3,7 @@
 use crate::result::condition::Condition;
 use crate::result::notes;
 use crate::result::row::Row;
-use crate::result::settings::{BoundaryRule, Load, Method};
+use crate::result::settings::{BoundaryRule, Elements, Load, Method};
 use serde::{Deserialize, Serialize};
 
 /// One line of `answers.csv`.
@@ -43,7 +43,6 @@ pub struct ScanFacts {
     pub size_mm: Option<[f64; 3]>,
     /// Relative error asked for.
     pub target: Option<f64>,
-    pub threshold_sensitivity: Option<f64>,
     /// Of the segmentation.
     pub warnings: Vec<String>,
 }
@@ -67,7 +66,7 @@ fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
     )
 }
 
-/// The row that answers; None where none has a modulus.
+/// The row that answers; None where none has a modulus. Rows that show only what a coarser image would change do not answer.
 pub fn best<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<&'a Row> {
     let order = |a: &&Row, b: &&Row| {
         let (a, b) = (rank(a), rank(b));
@@ -77,8 +76,9 @@ pub fn best<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<&'a Row> {
             .then(a.3.cmp(&b.3))
             .then(a.4.total_cmp(&b.4))
     };
-    let solved = rows.into_iter().filter(|row| row.e_app_mpa().is_some());
-    solved.min_by(order)
+    let answers =
+        |row: &&Row| row.e_app_mpa().is_some() && row.key.elements != Some(Elements::SmoothedGrey);
+    rows.into_iter().filter(answers).min_by(order)
 }
 
 /// A word for how a modulus was found.
@@ -143,7 +143,7 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
             .and_then(|s| s.failure)
             .map(|f| f.load_n),
         yield_stress_mpa: None,
-        threshold_sensitivity: facts.threshold_sensitivity,
+        threshold_sensitivity: row.solved.as_ref().and_then(|s| s.threshold_sensitivity),
         note,
     }
 }
@@ -270,6 +270,19 @@ mod tests {
         stopped.solved.as_mut().unwrap().converged = Some(false);
         let rows = [stopped, row("a", Some(BoundaryRule::GRADED), 40.0, None)];
         assert_eq!(answer_of(&rows).method, "graded");
+    }
+
+    #[test]
+    fn a_smoother_image_does_not_answer() {
+        let mut smoother = row("a", None, 30.0, Some(0.1));
+        smoother.key.elements = Some(Elements::SmoothedGrey);
+        let mut own = row("a", None, 40.0, Some(4.0));
+        own.solved.as_mut().unwrap().threshold_sensitivity = Some(1.5);
+        let answer = answer_of(&[smoother, own]);
+        assert_eq!(
+            (answer.e_app_mpa, answer.threshold_sensitivity),
+            (Some(40.0), Some(1.5))
+        );
     }
 
     #[test]

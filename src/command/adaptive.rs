@@ -4,9 +4,10 @@
 //! smoother image say of the shape. The best answer so far is kept. Lattices and coarser elements are not tried: a body whose
 //! cracks they bridge looks converged.
 
+use crate::command::answer;
 use crate::command::estimate;
 use crate::command::in_words::in_words;
-use crate::command::ladder::{COARSENED, REFINED, smoothed_again, voxel_fe};
+use crate::command::ladder::{COARSENED, ONE_REFINEMENT, REFINED, smoothed_again, voxel_fe};
 use crate::command::solve::OpenScan;
 use crate::error::Result;
 use crate::machine::session::Session;
@@ -14,7 +15,7 @@ use crate::pipeline::apparent::{SolveParams, of_voxels};
 use crate::pipeline::lattice::LatticeParams;
 use crate::record::error_target_note::ErrorTargetNote;
 use crate::result::row::Row;
-use crate::result::shape::{self, Image, Learnt};
+use crate::result::shape::{self, Image, Learnt, Stated};
 use std::path::Path;
 
 /// The outcome of `solve --error`.
@@ -44,13 +45,16 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
             scan.results().clear()?;
         }
     }
-    let rows = Climb {
+    let mut climb = Climb {
         scan: &mut scan,
         target,
         params: &params,
         session,
-    }
-    .climb()?;
+        dir,
+        rows: Vec::new(),
+    };
+    climb.climb()?;
+    let rows = climb.rows;
     finish(&mut scan, rows, target, session)
 }
 
@@ -60,34 +64,36 @@ struct Climb<'a> {
     target: f64,
     params: &'a SolveParams,
     session: &'a Session,
+    dir: &'a Path,
+    /// All that was solved so far.
+    rows: Vec<Row>,
 }
 
 impl Climb<'_> {
-    fn climb(&mut self) -> Result<Vec<Row>> {
+    fn climb(&mut self) -> Result<()> {
         let native = voxel_fe(self.params, 1, 1);
         if let Err(refused) = self.fits(&native) {
             for coarse in COARSENED.map(|n| voxel_fe(self.params, n, 1)) {
                 if self.fits(&coarse).is_ok() {
                     let words = format!("one element a voxel does not fit: {refused}");
                     self.session.warn(words);
-                    return self.step(&coarse);
+                    self.step(&coarse)?;
+                    return Ok(());
                 }
             }
             return Err(refused);
         }
-        let rows = self.step(&native)?;
+        let one = self.step(&native)?;
         match self.scan.image() {
-            Image::Grey { blur_voxels }
-                if !self.is_done(&rows) && self.params.material.is_none() =>
-            {
-                self.refine(rows, blur_voxels)
+            Image::Grey { blur_voxels } if !self.is_done() && self.params.material.is_none() => {
+                self.refine(one.as_ref(), blur_voxels)
             }
-            _ => Ok(rows),
+            _ => Ok(()),
         }
     }
 
-    /// Finer elements of interpolated grey values, after `rows` of one element a voxel.
-    fn refine(&mut self, mut rows: Vec<Row>, blur_voxels: f64) -> Result<Vec<Row>> {
+    /// Finer elements of interpolated grey values, after `one` element a voxel.
+    fn refine(&mut self, one: Option<&Row>, blur_voxels: f64) -> Result<()> {
         let again = self.step(&smoothed_again(self.params))?;
         for refined in REFINED.map(|n| voxel_fe(self.params, 1, n)) {
             if let Err(refused) = self.fits(&refined) {
@@ -95,38 +101,58 @@ impl Climb<'_> {
                 self.session.warn(words);
                 break;
             }
-            let mut fine = self.step(&refined)?;
-            if let Some(learnt) = self.learnt(rows.first(), again.first(), fine.first()) {
-                let stated = Some(shape::of_interpolated(blur_voxels, &learnt));
-                fine.iter_mut().for_each(|row| shape::state(row, stated));
-                let keys: Vec<_> = fine.iter().map(|row| row.key.clone()).collect();
-                self.scan.results().edit_rows(|row| {
-                    if keys.contains(&row.key) {
-                        shape::state(row, stated);
-                    }
-                })?;
+            let fine = self.step(&refined)?;
+            let stated = self
+                .learnt(one, again.as_ref(), fine.as_ref())
+                .map(|learnt| shape::of_interpolated(blur_voxels, &learnt));
+            if let Some((fine, stated)) = fine.zip(stated) {
+                self.state(&fine, stated)?;
             }
-            rows.extend(fine);
-            if self.is_done(&rows) {
+            let left_open = stated.map_or(0.0, |stated| stated.shape);
+            if self.is_done() || (self.target >= ONE_REFINEMENT && left_open > self.target) {
                 break;
             }
         }
-        rows.extend(again);
-        Ok(rows)
+        Ok(())
     }
 
-    fn step(&mut self, params: &SolveParams) -> Result<Vec<Row>> {
-        self.scan
-            .solve(&LatticeParams::default(), params, self.session)
+    /// Solves, keeps the row and the best answer so far, and returns the row.
+    fn step(&mut self, params: &SolveParams) -> Result<Option<Row>> {
+        let rows = self
+            .scan
+            .solve(&LatticeParams::default(), params, self.session)?;
+        let own = rows.iter().find(|row| !row.key.is_derived()).cloned();
+        self.rows.extend(rows);
+        self.answer()?;
+        Ok(own)
+    }
+
+    /// Puts the stated errors into the rows with the settings of `row`, here and in the results.
+    fn state(&mut self, row: &Row, stated: Stated) -> Result<()> {
+        let put = |other: &mut Row| {
+            if other.key == row.key {
+                shape::state(other, Some(stated));
+            }
+        };
+        self.rows.iter_mut().for_each(put);
+        self.scan.results().edit_rows(put)?;
+        self.answer()
+    }
+
+    fn answer(&self) -> Result<()> {
+        if !self.session.dry_run {
+            answer::keep(self.dir, &self.rows, Some(self.target))?;
+        }
+        Ok(())
     }
 
     fn fits(&self, params: &SolveParams) -> Result<()> {
         estimate::refuse_what_does_not_fit(&of_voxels(), self.scan.prepared(), params)
     }
 
-    fn is_done(&self, rows: &[Row]) -> bool {
-        let broken = rows.iter().all(Row::is_disconnected);
-        !self.session.dry_run && (broken || meets(rows, self.target))
+    fn is_done(&self) -> bool {
+        let broken = self.rows.iter().all(Row::is_disconnected);
+        !self.session.dry_run && (broken || meets(&self.rows, self.target))
     }
 
     /// What one element a voxel, the smoother image and finer elements say together.

@@ -5,6 +5,10 @@ use crate::pipeline::apparent::{Method, SolveParams};
 /// Elements a voxel along each axis, of interpolated grey values, after one element a voxel.
 pub const REFINED: [usize; 2] = [2, 3];
 
+/// Targets from here on stop after the first refinement where the image alone leaves more open. Smaller ones climb on, to the
+/// least error that can be stated.
+pub const ONE_REFINEMENT: f64 = 0.05;
+
 /// Voxels an element along each axis, tried in turn where one element a voxel does not fit into memory.
 pub const COARSENED: [usize; 3] = [2, 3, 4];
 

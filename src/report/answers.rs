@@ -114,12 +114,12 @@ fn explained(method: &str) -> &'static str {
 pub fn table(answers: &Answers) -> Table {
     let head = [
         "scan",
-        "subject",
-        "group",
-        "BV/TV",
         "E_app ± error (MPa)",
         "error (%)",
         "error asked for",
+        "group",
+        "subject",
+        "BV/TV",
         "how",
         "LP or element (mm)",
         "conditions",
@@ -141,12 +141,12 @@ fn cells(line: &AnswerLine, answers: &Answers) -> Vec<Cell> {
     };
     vec![
         link(&line.scan),
-        words(&line.subject),
-        words(&line.group),
-        number(Some(line.bv_tv)),
         with_error(line.e_app_mpa, line.error_mpa),
         percent(line),
         text(met),
+        words(&line.group),
+        words(&line.subject),
+        number(Some(line.bv_tv)),
         text(method_words(&line.method)),
         length(line.element_mm),
         text(match answers.apart.contains(&line.scan) {

@@ -215,6 +215,7 @@ fn plots_of(curve: &Curve) -> Vec<Plot> {
             Plot::Line(line(curve, hue, DASHES[curve.shape % DASHES.len()])),
             Plot::Scatter(markers(curve, hue).with_legend(curve.name.clone())),
         ],
+        Mark::Points if curve.name.is_empty() => vec![Plot::Scatter(markers(curve, hue))],
         Mark::Points => vec![Plot::Scatter(
             markers(curve, hue).with_legend(curve.name.clone()),
         )],

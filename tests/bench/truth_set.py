@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""The truth set: bodies of known shape, their moduli, and how near every method comes.
+"""The truth set: bodies of known shape, their moduli, and how near every method comes, at what cost.
 
-    python3 tests/bench/truth_set.py target/release/bonepd-ct            # quick: 16 bodies (about 10 minutes on one core)
-    ... --full              # all bodies, truths from voxels of 1/2, 1/3 and 1/4, repeats (some two hours)
-    ... --methods NAME,NAME # some methods only
+    python3 tests/bench/truth_set.py target/release/bonepd-ct            # 16 bodies (about an hour on one core)
+    ... --bodies 64         # all bodies (some four hours)
+    ... --fourfold          # truths from voxels of 1/2, 1/3 and 1/4 (else 1/2 and 1/3)
     ... --truths            # make reports/references.csv again first
-    ... --draw              # only print the tables from the files that are there
+    ... --draw              # only tables and charts, from the CSV files that are there
 
 Every body is analytic (`phantom --body`): triply periodic surfaces, lattices, foams, foams with broken struts, cracks,
 inclined plates. It has two truths. `body`: voxel FE on the body itself, sampled at finer and finer voxels, taken to voxel 0
@@ -13,31 +13,37 @@ inclined plates. It has two truths. `body`: voxel FE on the body itself, sampled
 Their difference is what imaging does, which no method can undo.
 
 Half A was used to set the constants of stated errors, half B was not looked at. Coverage is the share of bodies whose truth
-lies within the stated error. Writes reports/references.csv (truths) and reports/truth-set.csv (one row a body and method).
+lies within the stated error. Writes reports/references.csv (truths), reports/truth-set.csv (one row a body and method), and
+the tables of reports/speed-vs-error.md; its charts where matplotlib (PyPI) is there. The real stack is read from the folder
+that BONEPD_STACK names, and skipped where that is not there. Times are those of the solves as the program writes them
+(`wall_s`), one thread.
 """
 
-import argparse, csv, json, math, pathlib, statistics, subprocess, sys, tempfile, time
+import argparse, csv, json, math, os, pathlib, re, statistics, subprocess, sys, tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 REPORTS = ROOT / "reports"
+PAGE = REPORTS / "speed-vs-error.md"
 BODIES = ROOT / "tests" / "bench" / "truth_set.csv"
+STACK = pathlib.Path(os.environ.get("BONEPD_STACK", ROOT.parent / "shared/data/lhdl_3155_D_4_bc"))
 KNOWN_TO = 0.02  # truths less certain than this are no measure: a strut that grazes an end plane, a crack of half a voxel
 BLUR, SMOOTHING, NOISE_HU = 0.7, 0.5, 120  # voxels, voxels, HU of 2400
 
-# Name, how the scan is segmented, how it is solved. `clean` is partial volumes without blur or noise, `real` has both.
-# Where two rows are asked of one folder, both calls write to it.
-METHODS = {
-    "voxel-fe": [["--method", "voxel-fe"]],
-    "refine-2": [["--method", "voxel-fe", "--refine", "2"]],
-    "refine-3": [["--method", "voxel-fe", "--refine", "3"]],
-    "coarsen-2": [["--method", "voxel-fe", "--coarsen", "2"]],
-    "graded-t": [["--boundary", "graded", "--lp", "{t}"]],
-    "graded-t/2": [["--boundary", "graded", "--lp", "{t/2}"]],
-    "error-20%": [["--error", "20%"]],
-    "error-10%": [["--error", "10%"]],
-    "error-5%": [["--error", "5%"]],
-    "error-3%": [["--error", "3%"]],
-}
+FE = ["--method", "voxel-fe"]
+# Calls in one folder, so that a later one keeps the solves of an earlier one, and the rows to take: name, boundary, elements.
+# {t} is the mean thickness of struts. No row: the answer.
+CALLS = [
+    (["--lp", "{t}"], [("floppy, LP t", "floppy", None), ("firm, LP t", "firm", None), ("FFB, LP t", "ffb", None)]),
+    (["--lp", "{t/2}"], [("floppy, LP t/2", "floppy", None), ("firm, LP t/2", "firm", None), ("FFB, LP t/2", "ffb", None)]),
+    (["--boundary", "connected", "--lp", "{t}"], [("connected, LP t", "graded", None)]),
+    (["--boundary", "connected", "--lp", "{t/2}"], [("connected, LP t/2", "graded", None)]),
+    ([*FE, "--coarsen", "2"], [("voxel FE, coarsen 2", "NA", "block-means")]),
+    (FE, [("voxel FE", "NA", "voxels")]),
+    ([*FE, "--refine", "2"], [("voxel FE, refine 2", "NA", "interpolated-grey")]),
+    ([*FE, "--refine", "3"], [("voxel FE, refine 3", "NA", "interpolated-grey")]),
+    *((["--error", f"{target}%"], [(f"--error {target}%", None, None)]) for target in (20, 10, 5, 3)),
+]
+OF_MASKS = ("--refine", "--error")  # say nothing more of a mask than one element a voxel
 SCANS = {
     "clean": ([], ["--lower", "200"]),
     "real": (["--blur", str(BLUR), "--noise-hu", str(NOISE_HU)], ["--lower", "200", "--gaussian", str(SMOOTHING), "--blur-voxels", str(BLUR)]),
@@ -50,12 +56,10 @@ class Bench:
         self.program, self.work = program, pathlib.Path(work)
 
     def call(self, *words, fine=(0, 1)):
-        """Wall time of one call; ends the program where the call fails in another way than a target not met."""
-        began = time.monotonic()
+        """Ends the program where the call fails in another way than a target not met."""
         run = subprocess.run([self.program, *map(str, words), "--quiet", "--threads", "1"], capture_output=True, text=True)
         if run.returncode not in fine:
             sys.exit(f"{' '.join(map(str, words))}\n{run.stderr}")
-        return time.monotonic() - began
 
     def phantom(self, body, out, refine=1, image=(), mask=None):
         """The scan of a body in voxels of 1 mm / refine."""
@@ -83,10 +87,9 @@ def rows_of(folder):
         return list(csv.DictReader(file))
 
 
-def bodies(full):
+def bodies(number):
     with open(BODIES) as file:
-        every = list(csv.DictReader(file))
-    return every if full else every[:16]
+        return list(csv.DictReader(file))[:number]
 
 
 def at_voxel_0(sizes, moduli):
@@ -103,9 +106,9 @@ def at_voxel_0(sizes, moduli):
     return limit, max(0.5 * abs(moduli[-1] - limit), off)
 
 
-def truths_of(bench, body, full):
+def truths_of(bench, body, fourfold):
     """Moduli of the body and of its noise-free image, with uncertainties."""
-    finer = (2, 3, 4) if full else (2, 3)
+    finer = (2, 3, 4) if fourfold else (2, 3)
     solve = ["--method", "voxel-fe"]
     # Seen by coarse voxels, then blurred and smoothed: variances add, and a voxel's own box has 1/12.
     variance = BLUR**2 + SMOOTHING**2 + 1 / 12
@@ -120,32 +123,48 @@ def truths_of(bench, body, full):
     return (*at_voxel_0(sizes, of_body), *at_voxel_0(sizes, of_image))
 
 
-def make_truths(bench, full):
+def make_truths(bench, number, fourfold):
     names = ["body", "half", "e_body_mpa", "uncertainty_body_mpa", "e_image_mpa", "uncertainty_image_mpa"]
     with open(REPORTS / "references.csv", "w") as file:
         file.write(",".join(names) + "\n")
-        for body in bodies(full):
-            values = truths_of(bench, body, full)
+        for body in bodies(number):
+            values = truths_of(bench, body, fourfold)
             file.write(",".join([body["name"], body["half"], *(f"{v:.5g}" for v in values)]) + "\n")
             file.flush()
             print(body["name"], *(f"{v:.4g}" for v in values), flush=True)
 
 
-def answer_of(folder):
-    """Modulus and stated error: of answer.json where there is one, else of the last row."""
-    path = folder / "answer.json"
-    if path.exists():
-        answer = json.loads(path.read_text())
-        return answer["e_app_mpa"], answer["error_mpa"], answer["met"]
-    row = rows_of(folder)[-1]
-    stated = [row.get(key) or "NA" for key in ("algebraic_error_mpa", "discretization_error_mpa")]
-    shape = row.get("shape_error_mpa", "0")
-    # Without any of its parts no error is stated.
-    parts = [math.nan if part == "NA" else float(part) for part in [*stated, shape]]
-    return float(row["e_app_mpa"]), sum(parts), None
+def number(word):
+    return math.nan if word in (None, "", "NA") else float(word)
 
 
-def solved(bench, body, scan, method):
+def taken(folder, boundary, elements, length):
+    """Modulus, stated error, whether a target was met, seconds: of the last such row, or of the answer."""
+    if boundary is None:
+        answer = json.loads((folder / "answer.json").read_text())
+        return [answer["e_app_mpa"], answer["error_mpa"] or math.nan, answer["met"], answer["wall_s"]]
+    fits = lambda row: row["boundary"] == boundary and (elements is None or row["elements"] == elements)
+    near = lambda row: length is None or abs(float(row["lp_mm"]) / length - 1) < 0.01
+    row = [row for row in rows_of(folder) if fits(row) and near(row)][-1]
+    return [float(row["e_app_mpa"]), number(row["error_mpa"]), None, number(row["wall_s"])]
+
+
+def measured(bench, folder, scan):
+    """Every method on a segmented scan: name, modulus, stated error, met, seconds."""
+    thickness = json.loads((folder / "segment.json").read_text())["results"]["mean_thickness_mm"]
+    lengths = {"{t}": thickness, "{t/2}": thickness / 2}
+    for call, rows in CALLS:
+        if scan == "mask" and any(word in call for word in OF_MASKS):
+            continue
+        bench.call("solve", folder, *(f"{lengths[w]:.4f}" if w in lengths else w for w in call))
+        length = next((lengths[w] for w in call if w in lengths), None)
+        if "--refine" in call:
+            length = float(rows_of(folder)[-1]["voxel_mm"].split(";")[0]) / int(call[-1])
+        for name, boundary, elements in rows:
+            yield name, *taken(folder, boundary, elements, length)
+
+
+def segmented(bench, body, scan):
     phantom, segment = SCANS[scan]
     image, folder = bench.work / "scan.nii.gz", bench.fresh()
     if phantom is None:
@@ -153,24 +172,28 @@ def solved(bench, body, scan, method):
     else:
         bench.phantom(body, image, 1, phantom)
     bench.call("segment", image, "-o", folder, *segment)
-    thickness = json.loads((folder / "segment.json").read_text())["results"].get("mean_thickness_mm")
-    seconds = 0.0
-    for call in METHODS[method]:
-        lengths = {"{t}": 1.0, "{t/2}": 0.5}
-        words = [f"{thickness * lengths[w]:.4f}" if w in lengths else w for w in call]
-        seconds += bench.call("solve", folder, *words)
-    return (*answer_of(folder), seconds)
+    return folder
 
 
-def make_rows(bench, full, methods, scans):
+def make_rows(bench, number, scans):
     with open(REPORTS / "truth-set.csv", "w") as file:
         file.write("body,half,scan,method,e_app_mpa,error_mpa,met,seconds\n")
-        for body in bodies(full):
+
+        def keep(body, half, scan, folder):
+            for method, e, error, met, seconds in measured(bench, folder, scan):
+                file.write(f'{body},{half},{scan},"{method}",{e:.6g},{error:.4g},{met},{seconds:.3f}\n')
+                file.flush()
+
+        for body in bodies(number):
             for scan in scans:
-                for method in methods:
-                    e, error, met, seconds = solved(bench, body, scan, method)
-                    file.write(f"{body['name']},{body['half']},{scan},{method},{e:.6g},{error:.4g},{met},{seconds:.3f}\n")
-                    file.flush()
+                keep(body["name"], body["half"], scan, segmented(bench, body, scan))
+            print(body["name"], flush=True)
+        if STACK.exists():
+            folder = bench.fresh()
+            bench.call("segment", STACK, "-o", folder, "--spacing", 0.0195, "--gaussian", 1, "--lower", 63)
+            keep("stack", "-", "real", folder)
+        else:
+            print(f"the stack is skipped: {STACK} is not there", file=sys.stderr)
 
 
 def read(path, key):
@@ -182,50 +205,130 @@ def well_known(truth):
     return all(float(truth[f"uncertainty_{of}_mpa"]) <= KNOWN_TO * float(truth[f"e_{of}_mpa"]) for of in ("body", "image"))
 
 
-def print_tables():
+def load():
+    """Truths by body, rows of bodies whose truth is known well, names of the others, rows of the stack."""
     truths = read(REPORTS / "references.csv", lambda r: r["body"])
     with open(REPORTS / "truth-set.csv") as file:
-        every = [row for row in csv.DictReader(file) if row["body"] in truths]
-    rows = [row for row in every if well_known(truths[row["body"]])]
-    left_out = sorted({row["body"] for row in every} - {row["body"] for row in rows})
-    print(f"{len(left_out)} bodies whose truth is uncertain by more than {100 * KNOWN_TO:.0f} % are left out: {', '.join(left_out) or 'none'}")
-    print(f"{'scan':6} {'method':12} half   n  bias%  rms% worst%  image rms%  covered  median stated%  above 20%  met   seconds")
-    seen = dict.fromkeys((r["scan"], r["method"]) for r in rows)
-    for scan, method in seen:
-        for half in "AB":
-            some = [r for r in rows if (r["scan"], r["method"], r["half"]) == (scan, method, half)]
-            if some:
-                print(line(scan, method, half, some, truths))
+        every = list(csv.DictReader(file))
+    of_bodies = [row for row in every if row["body"] in truths]
+    rows = [row for row in of_bodies if well_known(truths[row["body"]])]
+    left_out = sorted({row["body"] for row in of_bodies} - {row["body"] for row in rows})
+    return truths, rows, left_out, [row for row in every if row["body"] == "stack"]
 
 
-def line(scan, method, half, rows, truths):
-    def off(row, key):
-        return 100 * (float(row["e_app_mpa"]) / float(truths[row["body"]][key]) - 1)
+def rms(values):
+    return math.sqrt(statistics.fmean(v * v for v in values))
 
-    def within(row):
-        truth, slack = (float(truths[row["body"]][k]) for k in ("e_body_mpa", "uncertainty_body_mpa"))
-        return abs(float(row["e_app_mpa"]) - truth) <= float(row["error_mpa"]) + slack
 
-    body, image = ([off(r, key) for r in rows] for key in ("e_body_mpa", "e_image_mpa"))
+def off(row, truths, key="e_body_mpa"):
+    return 100 * (float(row["e_app_mpa"]) / float(truths[row["body"]][key]) - 1)
+
+
+def within(row, truths):
+    truth, slack = (float(truths[row["body"]][k]) for k in ("e_body_mpa", "uncertainty_body_mpa"))
+    return abs(float(row["e_app_mpa"]) - truth) <= float(row["error_mpa"]) + slack
+
+
+def line(rows, truths):
+    """Bias, RMS and worst against the body, RMS against the image, coverage, stated errors, targets met, seconds."""
+    body, image = [off(r, truths) for r in rows], [off(r, truths, "e_image_mpa") for r in rows]
     stating = [r for r in rows if r["error_mpa"] != "nan"]
     stated = [100 * float(r["error_mpa"]) / max(float(r["e_app_mpa"]), 1e-30) for r in stating]
-    rms = lambda values: math.sqrt(statistics.fmean(v * v for v in values))
-    met = sum(r["met"] == "True" for r in rows)
+    covered = f"{sum(within(r, truths) for r in stating)} of {len(stating)}" if stating else "not stated"
+    met = f"{sum(r['met'] == 'True' for r in rows)} of {len(rows)}" if rows[0]["met"] != "None" else ""
     seconds = statistics.median(float(r["seconds"]) for r in rows)
-    return (
-        f"{scan:6} {method:12} {half}   {len(rows):3d} {statistics.fmean(body):+6.1f} {rms(body):5.1f} {max(body, key=abs):+6.1f}"
-        f"  {rms(image):10.1f}  {sum(map(within, stating)):3d}/{len(stating):<3d} {statistics.median(stated) if stated else math.nan:15.1f}"
-        f"  {sum(s > 20 for s in stated):9d} {met:4d}  {seconds:8.2f}"
-    )
+    return [
+        f"{statistics.fmean(body):+.1f}", f"{rms(body):.1f}", f"{max(body, key=abs):+.1f}", f"{rms(image):.1f}", covered,
+        f"{statistics.median(stated):.1f}" if stated else "", f"{max(stated):.1f}" if stated else "", met, f"{seconds:.2f}",
+    ]
+
+
+HEAD = ["bias %", "RMS %", "worst %", "RMS against image %", "within stated", "median stated %", "largest stated %", "met", "s"]
+
+
+def table(head, lines):
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in [head, ["---"] * len(head), *lines])
+
+
+def points(rows, truths):
+    """Seconds and RMS error of every method that moves."""
+    out = {}
+    for method in dict.fromkeys(r["method"] for r in rows):
+        own = [r for r in rows if r["method"] == method]
+        out[method] = (statistics.median(float(r["seconds"]) for r in own), rms([off(r, truths) for r in own]))
+    return out
+
+
+def front(points):
+    """Methods with none both faster and nearer."""
+    better = lambda a, b: a[0] <= b[0] and a[1] <= b[1] and a != b
+    return sorted((p, m) for m, p in points.items() if not any(better(q, p) for q in points.values()))
+
+
+def tables():
+    truths, rows, left_out, stack = load()
+    out = {}
+    for scan in SCANS:
+        own = [r for r in rows if r["scan"] == scan]
+        if not own:
+            continue
+        methods = dict.fromkeys(r["method"] for r in own)
+        out[scan] = table(["method", *HEAD], [[m, *line([r for r in own if r["method"] == m], truths)] for m in methods])
+        halves = [(m, half, [r for r in own if (r["method"], r["half"]) == (m, half)]) for m in methods for half in "AB"]
+        stating = [(m, half, some) for m, half, some in halves if some and any(r["error_mpa"] != "nan" for r in some)]
+        out[f"{scan}-halves"] = table(["method", "half", *HEAD], [[m, half, *line(some, truths)] for m, half, some in stating])
+        found = front(points(own, truths))
+        out[f"{scan}-front"] = table(["on the Pareto front", "s", "RMS %"], [[m, f"{t:.2f}", f"{e:.1f}"] for (t, e), m in found])
+    stated = lambda r: "" if r["error_mpa"] == "nan" else f"{100 * float(r['error_mpa']) / float(r['e_app_mpa']):.1f}"
+    out["stack"] = table(["method", "E_app MPa", "stated %", "s"], [[r["method"], f"{float(r['e_app_mpa']):.2f}", stated(r), r["seconds"]] for r in stack])
+    names = ["e_body_mpa", "uncertainty_body_mpa", "e_image_mpa", "uncertainty_image_mpa"]
+    out["truths"] = table(["body", "half", "body MPa", "±", "image MPa", "±"], [[n, t["half"], *(t[k] for k in names)] for n, t in truths.items()])
+    out["left-out"] = f"Left out, their truth is uncertain by more than {100 * KNOWN_TO:.0f} %: {', '.join(left_out) or 'none'}."
+    return out
+
+
+def chart():
+    try:
+        import matplotlib
+    except ImportError:
+        print("no charts: matplotlib is not there", file=sys.stderr)
+        return
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    truths, rows, _, _ = load()
+    for scan, title in (("clean", "partial volumes"), ("real", "blur and noise")):
+        own = points([r for r in rows if r["scan"] == scan], truths)
+        figure, axes = plt.subplots(figsize=(7.5, 5))
+        best = front(own)
+        axes.plot([t for (t, _), _ in best], [e for (_, e), _ in best], "--", color="0.6")
+        for method, (t, e) in own.items():
+            shape, hue = ("s", "tab:blue") if "FE" in method else ("^", "tab:orange") if method.startswith("--") else ("o", "tab:green")
+            axes.plot(t, e, shape, color=hue)
+            axes.annotate(method, (t, e), xytext=(5, 3), textcoords="offset points", fontsize=8)
+        axes.set(xscale="log", yscale="log", xlabel="median time of a solve, s (one core)", ylabel="RMS error against the body, %", title=f"Bodies seen with {title}")
+        axes.margins(x=0.15)
+        figure.tight_layout()
+        (REPORTS / "speed-vs-error").mkdir(exist_ok=True)
+        figure.savefig(REPORTS / "speed-vs-error" / f"{scan}.png", dpi=110)
+
+
+def draw():
+    text = PAGE.read_text()
+    for key, words in tables().items():
+        print(f"\n{key}\n{words}")
+        text = re.sub(rf"(<!-- {key} -->\n).*?(<!-- end -->)", lambda m: m[1] + words + "\n" + m[2], text, flags=re.S)
+    PAGE.write_text(text)
+    chart()
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", nargs="?")
-    parser.add_argument("--full", action="store_true")
+    parser.add_argument("--bodies", type=int, default=16)
+    parser.add_argument("--fourfold", action="store_true")
     parser.add_argument("--truths", action="store_true")
     parser.add_argument("--draw", action="store_true")
-    parser.add_argument("--methods", default=",".join(METHODS))
     parser.add_argument("--scans", default=",".join(SCANS))
     args = parser.parse_args()
     if not args.draw:
@@ -234,9 +337,9 @@ def main():
         with tempfile.TemporaryDirectory() as work:
             bench = Bench(args.program, work)
             if args.truths or not (REPORTS / "references.csv").exists():
-                make_truths(bench, args.full)
-            make_rows(bench, args.full, args.methods.split(","), args.scans.split(","))
-    print_tables()
+                make_truths(bench, args.bodies, args.fourfold)
+            make_rows(bench, args.bodies, args.scans.split(","))
+    draw()
 
 
 if __name__ == "__main__":

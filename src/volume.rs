@@ -49,6 +49,13 @@ impl<T> Volume<T> {
         cropped
     }
 
+    /// All values, x fastest, to change.
+    pub fn as_mut_slice(&mut self) -> &mut [T] {
+        self.values
+            .as_slice_mut()
+            .expect("volumes are kept in standard layout")
+    }
+
     /// All values, x fastest.
     pub fn as_slice(&self) -> &[T] {
         self.values

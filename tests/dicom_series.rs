@@ -256,14 +256,28 @@ fn what_is_not_read_is_named() {
     );
     refused(&one(short([0x28, 0x100], 1)), &["1-bit pixels"]);
     refused(&one(dicom::pixels(&[1])), &["2 bytes of pixels where 12"]);
-    for (uid, name) in [
-        ("1.2.840.10008.1.2.4.80", "JPEG-LS"),
-        ("1.2.840.10008.1.2.4.90", "JPEG 2000"),
-        ("1.2.840.10008.1.2.4.201", "HTJ2K"),
-        ("1.2.840.10008.1.2.9.9", "1.2.840.10008.1.2.9.9"),
+    for (uid, name, program) in [
+        ("1.2.840.10008.1.2.4.80", "JPEG-LS", "dcmdjpls IN OUT"),
+        (
+            "1.2.840.10008.1.2.4.81",
+            "JPEG-LS, lossy",
+            "dcmdjpls IN OUT",
+        ),
+        ("1.2.840.10008.1.2.4.90", "JPEG 2000", "gdcmconv --raw"),
+        (
+            "1.2.840.10008.1.2.4.91",
+            "JPEG 2000, lossy",
+            "gdcmconv --raw",
+        ),
+        ("1.2.840.10008.1.2.4.201", "HTJ2K", "pylibjpeg-openjpeg"),
+        (
+            "1.2.840.10008.1.2.9.9",
+            "1.2.840.10008.1.2.9.9",
+            "gdcmconv --raw",
+        ),
     ] {
         let bytes = compressed(uid, vec![vec![1, 2, 3, 4]], [3, 2], 16);
-        refused(&vec![("a.dcm".into(), bytes)], &[name, "gdcmconv --raw"]);
+        refused(&vec![("a.dcm".into(), bytes)], &[name, program]);
     }
 }
 
@@ -355,4 +369,205 @@ fn orientation_stays_where_only_the_pixel_size_is_missing() {
     assert_eq!(known.volume.affine, given.volume.affine);
     assert_eq!(known.turn, given.turn);
     assert!(!known.turn.is_identity());
+}
+
+/// The same voxels, however the file is coded.
+fn alike(syntaxes: &[Syntax]) {
+    let request = items(
+        [0x40, 0x275],
+        vec![vec![text([0x40, 7], "LO", "request")], Vec::new()],
+    );
+    let slices = changed(even(3, 0.06), &request);
+    let plain = stored(&series(&slices)).unwrap();
+    for syntax in syntaxes {
+        let file = |(k, e): (usize, &Vec<Element>)| (format!("s/{k}.dcm"), syntax.file(e));
+        let found = stored(&slices.iter().enumerate().map(file).collect()).unwrap();
+        assert_eq!(found.values, plain.values, "{syntax:?}");
+        assert_eq!(
+            (found.spacing_mm, found.affine),
+            (plain.spacing_mm, plain.affine),
+            "{syntax:?}"
+        );
+    }
+}
+
+#[test]
+fn deflated_files_and_zeros_after_the_pixels_are_read() {
+    let padded = Syntax {
+        padded: true,
+        ..EXPLICIT
+    };
+    let deflated = Syntax {
+        deflated: true,
+        ..EXPLICIT
+    };
+    alike(&[padded, deflated]);
+}
+
+#[test]
+fn files_without_a_preamble_or_meta_information_are_read() {
+    let bare = Syntax {
+        preamble: false,
+        ..EXPLICIT
+    };
+    let without_meta = Syntax {
+        meta: false,
+        ..bare
+    };
+    let implicit = Syntax {
+        implicit: true,
+        ..without_meta
+    };
+    alike(&[bare, without_meta, implicit]);
+}
+
+#[test]
+fn sequences_whose_representation_is_unknown_are_passed_over() {
+    let unknown = Syntax {
+        unknown: true,
+        ..EXPLICIT
+    };
+    let open = Syntax {
+        open: true,
+        ..unknown
+    };
+    alike(&[unknown, open]);
+}
+
+#[test]
+fn frames_lie_where_their_functional_groups_say() {
+    let mut file = slice([0.0; 3], 1);
+    file.retain(|e| {
+        !matches!(
+            e.tag,
+            POSITION | [0x20, 0x37] | [0x28, 0x30] | [0x28, 0x1052] | [0x28, 0x1053]
+        )
+    });
+    let places = [0.12, 0.0, 0.06];
+    file.push(text([0x28, 8], "IS", places.len()));
+    let words: Vec<u16> = (0..18).collect();
+    dicom::set(&mut file, dicom::pixels(&words));
+    let group = |tag, inner: Vec<Element>| items(tag, vec![inner]);
+    let frame = |z: &f64| {
+        let position = text(POSITION, "DS", dicom::decimals([0.0, 0.0, *z]));
+        vec![group([0x20, 0x9113], vec![position])]
+    };
+    file.push(items([0x5200, 0x9230], places.iter().map(frame).collect()));
+    let shared = vec![
+        group([0x28, 0x9110], vec![text([0x28, 0x30], "DS", "0.05\\0.04")]),
+        group(
+            [0x20, 0x9116],
+            vec![text([0x20, 0x37], "DS", "1\\0\\0\\0\\1\\0")],
+        ),
+        group(
+            [0x28, 0x9145],
+            vec![
+                text([0x28, 0x1052], "DS", -1000),
+                text([0x28, 0x1053], "DS", 2),
+                text([0x28, 0x1054], "LO", "HU"),
+            ],
+        ),
+    ];
+    file.push(items([0x5200, 0x9229], vec![shared]));
+    let s = stored(&vec![("frames".into(), EXPLICIT.file(&file))]).unwrap();
+    assert_eq!(s.spacing_mm, Some([0.04, 0.05, 0.06]));
+    assert_eq!(s.unit.as_deref(), Some("HU"));
+    assert!(s.affine.is_some());
+    let firsts = [s.values[0], s.values[6], s.values[12]];
+    assert_eq!(firsts, [-988.0, -976.0, -1000.0]);
+}
+
+/// Two slices of 24 × 24 pixels: bone of about 1500 in a quarter, air of about 100, and padding in eight columns, of this
+/// value or one more.
+fn padded(padding: u16, limit: Option<u16>) -> Files {
+    let value = |i: usize| match (i % 24, i / 24) {
+        (..8, _) => padding + u16::from(limit.is_some() && i % 2 == 0),
+        (_, row) if row % 4 == 0 => 1500 + (i * 7919 % 81) as u16,
+        _ => 100 + (i * 7919 % 81) as u16,
+    };
+    let slice = |k: usize| {
+        let mut s = dicom::slice([24, 24], [0.0, 0.0, 0.05 * k as f64], k + 1);
+        dicom::set(&mut s, short([0x28, 0x103], 0));
+        s.push(text([0x28, 0x1052], "DS", -1000));
+        s.push(text([0x28, 0x1053], "DS", 1));
+        s.push(short([0x28, 0x120], padding));
+        s.extend(limit.map(|limit| short([0x28, 0x121], limit)));
+        s.push(dicom::pixels(&(0..576).map(value).collect::<Vec<_>>()));
+        s
+    };
+    series(&[slice(0), slice(1)])
+}
+
+#[test]
+fn padding_is_neither_bone_nor_a_part_of_otsus_histogram() {
+    use crate::inputs::program;
+    let run = |files: &Files, words: &[&str]| {
+        with(files, |path| {
+            let dir = path.parent().unwrap();
+            let (code, said) = program(
+                dir,
+                &[&["segment", "s", "-o", "out", "--keep-all"], words].concat(),
+            );
+            assert_eq!(code, Some(0), "{said}");
+            said
+        })
+    };
+    // A third of the voxels is padding; a quarter of the rest is bone: 2 · 6 · 16.
+    let bone = "192 bone voxels";
+    for (padding, limit, values) in [
+        (2000, None, "hold 1000, which"),
+        (2000, Some(2001), "hold 1000 to 1001, which"),
+        (800, None, "hold -200, which"),
+        (0, Some(1), "hold -1000 to -999, which"),
+    ] {
+        let files = padded(padding, limit);
+        let said = run(&files, &["--otsu"]);
+        assert!(said.contains(bone), "{padding}: {said}");
+        assert!(
+            said.contains(&format!("note: s: 33.3 % of the voxels {values}")),
+            "{padding}: {said}"
+        );
+        let said = run(&files, &["--lower=-300"]);
+        assert!(said.contains(bone), "{padding}: {said}");
+        let is_taken = said.contains("warning: s: 33.3 %");
+        assert_eq!(is_taken, padding > 700, "{padding}: {said}");
+        let said = with(&files, |path| {
+            program(path.parent().unwrap(), &["info", "s"]).1
+        });
+        assert!(
+            said.contains("in 33.3 % of the voxels: no measurement"),
+            "{said}"
+        );
+        assert!(said.contains("grey values  -900 to 580"), "{said}");
+        assert!(said.contains("25.0 % of the voxels lie above"), "{said}");
+    }
+}
+
+#[test]
+fn padding_that_differs_from_slice_to_slice_is_not_used_and_said() {
+    let mut slices = even(2, 0.06);
+    dicom::set(&mut slices[0], short([0x28, 0x120], 100));
+    let s = stored(&series(&slices)).unwrap();
+    assert_eq!(s.padding, None);
+    assert!(
+        s.notes.join("").contains("PixelPaddingValue is not used"),
+        "{:?}",
+        s.notes
+    );
+    let s = stored(&series(&changed(slices, &short([0x28, 0x120], 100)))).unwrap();
+    assert_eq!(s.padding, Some([100.0; 2]));
+    let table = Element {
+        tag: [0x28, 0x3002],
+        vr: "US",
+        value: Value::Short(vec![1, 0, 16]),
+    };
+    let data = Element {
+        tag: [0x28, 0x3006],
+        vr: "OW",
+        value: Value::Short(vec![7]),
+    };
+    let lut = items([0x28, 0x3000], vec![vec![table, data]]);
+    let with_table = changed(even(1, 0.06), &lut);
+    let s = stored(&series(&changed(with_table, &short([0x28, 0x120], 100)))).unwrap();
+    assert_eq!(s.padding, None);
 }

@@ -3,6 +3,7 @@
 mod arrays;
 mod descriptions;
 mod headers;
+mod kinds;
 mod masks;
 mod plausible;
 mod slices;

@@ -2,7 +2,7 @@
 
 use crate::written::nifti::{self, code};
 use crate::written::text::Header;
-use crate::written::{Files, gzip, scalars, stored, with};
+use crate::written::{Files, bzip2, gzip, scalars, stored, with};
 use bonepd_ct::image::scan;
 
 fn values() -> Vec<f64> {
@@ -381,4 +381,157 @@ fn metaimage_words_that_change_voxels_are_honoured_or_refused() {
         "{:?}",
         s.notes
     );
+}
+
+/// Slices of the voxels in files of their own: `name(k)`, each after `skipped`.
+fn slices(name: impl Fn(usize) -> String, skipped: &[u8]) -> Files {
+    let parts = voxels();
+    let file = |(k, part): (usize, &[u8])| (name(k), [skipped, part].concat());
+    parts.chunks(12).enumerate().map(file).collect()
+}
+
+fn read_beside(header: (&str, Vec<u8>), beside: Files) -> Vec<f32> {
+    let files = [vec![(header.0.to_owned(), header.1)], beside].concat();
+    stored(&files).unwrap().values
+}
+
+#[test]
+fn nrrd_words_are_read_in_any_case_and_axes_of_one_are_passed_over() {
+    let numbers: Vec<String> = values().iter().map(f64::to_string).collect();
+    let hex: String = voxels().iter().map(|b| format!("{b:02X}")).collect();
+    for (encoding, data) in [
+        ("RAW", voxels()),
+        ("GZIP", gzip(&voxels())),
+        ("Bzip2", bzip2(&voxels())),
+        ("HEX", hex.into_bytes()),
+        ("ASCII", numbers.join(" ").into_bytes()),
+    ] {
+        let mut h = nrrd();
+        h.set("type", "Short").set("encoding", encoding);
+        let files = vec![("a.nrrd".to_string(), [h.nrrd(), data].concat())];
+        assert_eq!(stored(&files).unwrap().values, expected(), "{encoding}");
+    }
+    for (sizes, spacings) in [
+        ("1 2 3 4", "nan 0.02 0.03 0.04"),
+        ("2 3 4 1", "0.02 0.03 0.04 nan"),
+    ] {
+        let mut h = nrrd();
+        h.set("dimension", "4")
+            .set("sizes", sizes)
+            .set("spacings", spacings);
+        let s = stored(&nrrd_file(&h)).unwrap();
+        assert_eq!((s.n, s.spacing_mm), ([2, 3, 4], Some([0.02, 0.03, 0.04])));
+        assert_eq!(s.values, expected(), "{sizes}");
+    }
+}
+
+#[test]
+fn nrrd_says_its_byte_order_in_any_case() {
+    let swapped = scalars("int16", true, &values());
+    for word in ["big", "BIG", "Big"] {
+        let mut h = nrrd();
+        h.set("endian", word);
+        let files = vec![("a.nrrd".to_string(), [h.nrrd(), swapped.clone()].concat())];
+        assert_eq!(stored(&files).unwrap().values, expected(), "{word}");
+    }
+}
+
+#[test]
+fn nrrd_skips_lines_and_bytes_before_the_voxels() {
+    let lines = b"one\ntwo\n".as_slice();
+    for (keys, encoding, data) in [
+        (
+            [("line skip", "2")].as_slice(),
+            "raw",
+            [lines, &voxels()].concat(),
+        ),
+        (&[("lineskip", "2")], "raw", [lines, &voxels()].concat()),
+        (
+            &[("byte skip", "5")],
+            "raw",
+            [b"abcde", &voxels()[..]].concat(),
+        ),
+        (
+            &[("byteskip", "5")],
+            "raw",
+            [b"abcde", &voxels()[..]].concat(),
+        ),
+        (
+            &[("byte skip", "-1")],
+            "raw",
+            [b"any", &voxels()[..]].concat(),
+        ),
+        (
+            &[("lineskip", "2"), ("byteskip", "3")],
+            "raw",
+            [lines, b"123", &voxels()].concat(),
+        ),
+        // Of a compressed file lines are skipped before, bytes within.
+        (
+            &[("byte skip", "5")],
+            "gzip",
+            gzip(&[b"abcde", &voxels()[..]].concat()),
+        ),
+        (
+            &[("line skip", "2")],
+            "gzip",
+            [lines, &gzip(&voxels())].concat(),
+        ),
+    ] {
+        let mut h = nrrd();
+        h.set("encoding", encoding);
+        h.0.extend(keys.iter().map(|(k, v)| (k.to_string(), v.to_string())));
+        h.0.push(("data file".into(), "v.bin".into()));
+        let found = read_beside(("a.nhdr", h.nrrd()), vec![("v.bin".into(), data)]);
+        assert_eq!(found, expected(), "{keys:?} {encoding}");
+    }
+}
+
+#[test]
+fn nrrd_lists_and_patterns_name_files_of_slices() {
+    let of = |data_file: &str| {
+        let mut h = nrrd();
+        h.0.push(("data file".into(), data_file.into()));
+        ("a.nhdr", h.nrrd())
+    };
+    let name = |k| format!("s{k:03}.raw");
+    let list = "LIST\ns000.raw\ns001.raw\ns002.raw\ns003.raw";
+    for data_file in [list, "s%03d.raw 0 3 1"] {
+        let found = read_beside(of(data_file), slices(name, b""));
+        assert_eq!(found, expected(), "{data_file}");
+    }
+    let missing = [vec![("a.nhdr".to_string(), of(list).1)], slices(name, b"")].concat();
+    refused(&missing[..4].to_vec(), &["s003.raw"]);
+}
+
+#[test]
+fn metaimage_lists_and_patterns_skip_each_files_header() {
+    let name = |k| format!("s{k:03}.raw");
+    let names = "s000.raw\ns001.raw\ns002.raw\ns003.raw";
+    for (skip, skipped, data_file) in [
+        ("16", 16, format!("LIST\n{names}")),
+        ("-1", 77, format!("LIST\n{names}")),
+        ("0", 0, format!("LIST 2D\n{names}")),
+        ("0", 0, "s%03d.raw 0 3 1".to_string()),
+        ("16", 16, "s%03d.raw 0 3 1".to_string()),
+    ] {
+        let mut h = metaimage();
+        h.set("HeaderSize", skip).set("ElementDataFile", &data_file);
+        let found = read_beside(("a.mhd", h.metaimage()), slices(name, &vec![7; skipped]));
+        assert_eq!(found, expected(), "{skip} {data_file}");
+    }
+    let mut text = metaimage().metaimage();
+    text.splice(0..0, *b"\n");
+    let file = vec![("a.mha".to_string(), [text, voxels()].concat())];
+    assert_eq!(stored(&file).unwrap().values, expected(), "an empty line");
+}
+
+#[test]
+fn metaimage_of_numbers_in_text_is_read_as_numbers() {
+    let numbers: Vec<String> = values().iter().map(f64::to_string).collect();
+    let mut h = metaimage();
+    h.set("BinaryData", "False");
+    let file = [h.metaimage(), numbers.join("\n").into_bytes()].concat();
+    let s = stored(&vec![("a.mha".into(), file)]).unwrap();
+    assert_eq!(s.values, expected());
 }

@@ -5,7 +5,7 @@ use crate::format::calibration::{Calibration, GreyUnit};
 use crate::format::orient::Turn;
 use crate::image::array::headerless::Contents;
 use crate::image::scan;
-use crate::mask::{threshold, usable};
+use crate::mask::{threshold, unmeasured, usable};
 use crate::pipeline::segment::implausible_voxels;
 use serde::Serialize;
 use std::path::Path;
@@ -34,6 +34,10 @@ pub struct ScanInfo {
     /// Values and their voxels where they are few: a labelled scan or a mask.
     pub labels: Vec<(f32, u64)>,
     pub calibration: Option<Calibration>,
+    /// Values from the first to the second stand for no measurement, by the file's word: no part of the numbers above. None
+    /// where no voxel holds one.
+    pub padding: Option<[f32; 2]>,
+    pub padding_voxels: u64,
     pub non_finite_voxels: u64,
     pub blake3: String,
     /// Further facts of the format. Names of persons are left out.
@@ -51,21 +55,20 @@ pub fn info(file: &Path) -> Result<ScanInfo> {
 /// The same; `raw` is what is in a file without a header.
 pub fn info_of(file: &Path, raw: Option<Contents>) -> Result<ScanInfo> {
     let mut stored = scan::stored_as(file, raw)?;
+    let hidden = unmeasured::hide(&mut stored.values, stored.padding);
     let (otsu, notes) = otsu(&stored.values);
     stored.notes.extend(notes);
-    let mut sorted: Vec<f32> = stored
-        .values
-        .iter()
-        .copied()
-        .filter(|v| v.is_finite())
-        .collect();
-    let non_finite = (stored.values.len() - sorted.len()) as u64;
-    let mean = sorted.iter().map(|&v| f64::from(v)).sum::<f64>() / sorted.len().max(1) as f64;
-    sorted.sort_unstable_by(f32::total_cmp);
-    let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
-    let some = !sorted.is_empty();
-    let above = |t: f64| sorted.len() - sorted.partition_point(|&v| f64::from(v) < t);
-    let otsu_share = otsu.map(|t| above(t) as f64 / sorted.len() as f64);
+    let mut values = stored.values;
+    let all = values.len() as u64;
+    values.retain(|v| v.is_finite());
+    let padding_voxels = hidden.map_or(0, |h| h.voxels);
+    let non_finite = all - values.len() as u64 - padding_voxels;
+    let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len().max(1) as f64;
+    let some = !values.is_empty();
+    let above = |t: f64| values.iter().filter(|v| f64::from(**v) >= t).count();
+    let otsu_share = otsu.map(|t| above(t) as f64 / values.len() as f64);
+    let labels = labels(&values);
+    let at = ranked(&mut values, &[0.0, 0.01, 0.25, 0.5, 0.75, 0.99, 1.0]);
     let turn = stored.affine.as_ref().and_then(Turn::of);
     let from = turn.map_or([0, 1, 2], |turn| turn.from);
     let voxels = from.map(|a| stored.n[a]);
@@ -78,18 +81,16 @@ pub fn info_of(file: &Path, raw: Option<Contents>) -> Result<ScanInfo> {
         spacing_mm: spacing,
         size_mm: size,
         unit: stored.unit,
-        grey_min: some.then(|| at(0.0)),
-        grey_max: some.then(|| at(1.0)),
+        grey_min: some.then(|| at[0]),
+        grey_max: some.then(|| at[6]),
         grey_mean: some.then_some(mean),
-        grey_percentiles: if some {
-            [0.01, 0.25, 0.5, 0.75, 0.99].map(at).to_vec()
-        } else {
-            Vec::new()
-        },
+        grey_percentiles: at.get(1..6).unwrap_or_default().to_vec(),
         otsu,
         otsu_share,
-        labels: labels(&sorted),
+        labels,
         calibration: stored.calibration,
+        padding: hidden.map(|h| h.range),
+        padding_voxels,
         non_finite_voxels: non_finite,
         blake3: scan::hash(file)?,
         details: stored.details,
@@ -122,7 +123,7 @@ fn otsu(values: &[f32]) -> (Option<f64>, Vec<String>) {
     let Some(ends) = usable::extremes(values) else {
         return (None, Vec::new());
     };
-    let (padding, range) = usable::padding(values, &ends, None);
+    let (padding, range) = usable::padding(values, &ends);
     let (range, outliers) = usable::without_outliers(values, range, ends.finite);
     let [low, high] = range;
     if low >= high {
@@ -138,16 +139,31 @@ fn otsu(values: &[f32]) -> (Option<f64>, Vec<String>) {
 const MOST_LABELS: usize = 12;
 
 /// Whole numbers and how often they occur; empty where values are many or broken.
-fn labels(sorted: &[f32]) -> Vec<(f32, u64)> {
-    let mut found = Vec::new();
-    let mut rest = sorted;
-    while let Some(&value) = rest.first() {
-        if found.len() == MOST_LABELS || value.fract() != 0.0 {
-            return Vec::new();
+fn labels(values: &[f32]) -> Vec<(f32, u64)> {
+    let mut found: Vec<(f32, u64)> = Vec::new();
+    for &value in values {
+        match found.iter().position(|label| label.0 == value) {
+            Some(at) => found[at].1 += 1,
+            None if found.len() == MOST_LABELS || value.fract() != 0.0 => return Vec::new(),
+            None => found.push((value, 1)),
         }
-        let count = rest.partition_point(|&v| v <= value);
-        found.push((value, count as u64));
-        rest = &rest[count..];
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found
+}
+
+/// The values at these shares (rising) of the way from the least to the largest. They are reordered; nothing of no values.
+fn ranked(values: &mut [f32], shares: &[f64]) -> Vec<f32> {
+    let Some(last) = values.len().checked_sub(1) else {
+        return Vec::new();
+    };
+    let (mut found, mut first) = (Vec::new(), 0);
+    for share in shares {
+        let at = (last as f64 * share).round() as usize;
+        // Those before `first` are smaller than all others.
+        let (_, value, _) = values[first..].select_nth_unstable_by(at - first, f32::total_cmp);
+        found.push(*value);
+        first = at;
     }
     found
 }
@@ -184,6 +200,17 @@ fn lines(info: &ScanInfo) -> Vec<String> {
         ));
     }
     lines.extend(suggestion(info));
+    if let Some([low, high]) = info.padding {
+        let values = match low == high {
+            true => low.to_string(),
+            false => format!("{low} to {high}"),
+        };
+        let voxels: usize = info.voxels.iter().product();
+        lines.push(format!(
+            "padding      {values} in {:.1} % of the voxels: no measurement (taken as pore)",
+            100.0 * info.padding_voxels as f64 / voxels.max(1) as f64
+        ));
+    }
     if info.non_finite_voxels > 0 {
         lines.push(format!(
             "not finite   {} voxels (taken as pore)",

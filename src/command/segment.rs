@@ -7,6 +7,7 @@ use crate::format::orient::Turn;
 use crate::image::scan::{self, Reading, Scan};
 use crate::io::atomic;
 use crate::machine::session::Session;
+use crate::mask::unmeasured::{self, Hidden};
 use crate::measure::spheres::Spread;
 use crate::pipeline::segment as stage;
 use crate::pipeline::segment::{SegmentParams, Voi};
@@ -44,9 +45,20 @@ pub fn segment(
         results::set_aside_stale(dir, session);
         return Ok(kept);
     }
-    let (scan, voi_mask) = read(input, name, params, session)?;
-    let mut segmented = stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?;
+    let Whole {
+        scan,
+        voi_mask,
+        hidden,
+    } = read(input, name, params, session)?;
+    let mut segmented = stage::segment_measured(
+        &scan.name,
+        &scan.volume,
+        params,
+        voi_mask.as_ref(),
+        hidden.as_ref(),
+    )?;
     let warnings = &mut segmented.summary.warnings;
+    warnings.extend(scan.warnings.iter().cloned());
     warnings.extend(threshold_in_counts(&scan, params));
     warnings.extend(values_out_of_unit(&scan, params));
     let record = SegmentRecord {
@@ -96,20 +108,40 @@ pub fn in_memory(
     params: &SegmentParams,
     session: &Session,
 ) -> Result<Specimen> {
-    let (scan, voi_mask) = read(input, name, params, session)?;
-    if let Some(warning) = threshold_in_counts(&scan, params) {
-        session.warn_of(Some(&scan.name), warning);
-    }
-    Ok(stage::segment(&scan.name, &scan.volume, params, voi_mask.as_ref())?.specimen)
+    let Whole {
+        scan,
+        voi_mask,
+        hidden,
+    } = read(input, name, params, session)?;
+    let warnings = scan.warnings.iter().cloned();
+    warnings
+        .chain(threshold_in_counts(&scan, params))
+        .for_each(|warning| session.warn_of(Some(&scan.name), warning));
+    let segmented = stage::segment_measured(
+        &scan.name,
+        &scan.volume,
+        params,
+        voi_mask.as_ref(),
+        hidden.as_ref(),
+    )?;
+    Ok(segmented.specimen)
 }
 
-/// The scan, and the mask that is its volume of interest, if one is.
+/// A scan that was read, and what goes with it.
+struct Whole {
+    scan: Scan,
+    /// The mask that is its volume of interest, if one is.
+    voi_mask: Option<Volume<u8>>,
+    /// Voxels that are no measurement, which are NaN in the scan now.
+    hidden: Option<Hidden>,
+}
+
 fn read(
     input: &Path,
     name: Option<&str>,
     params: &SegmentParams,
     session: &Session,
-) -> Result<(Scan, Option<Volume<u8>>)> {
+) -> Result<Whole> {
     let mut scan = scan::read_as(input, &reading(params))?;
     stage::refuse_impossible_voxels(scan.volume.grid.spacing_mm)?;
     if let Some(name) = name {
@@ -127,7 +159,12 @@ fn read(
     scan.notes
         .iter()
         .for_each(|note| session.note_of(&scan.name, note));
-    Ok((scan, voi_mask))
+    let hidden = unmeasured::hide(scan.volume.as_mut_slice(), scan.padding);
+    Ok(Whole {
+        scan,
+        voi_mask,
+        hidden,
+    })
 }
 
 fn reading(params: &SegmentParams) -> Reading {

@@ -35,6 +35,8 @@ pub struct Scan {
     pub details: Vec<(String, String)>,
     /// What a user should know of how the file was understood.
     pub notes: Vec<String>,
+    /// What makes results wrong where it was not meant.
+    pub warnings: Vec<String>,
 }
 
 /// How a scan is to be read.
@@ -63,7 +65,7 @@ pub fn read_as(path: &Path, reading: &Reading) -> Result<Scan> {
     let spacing_mm = reading.spacing_mm.map(checked_spacing).transpose()?;
     let mut stored = stored_as(path, reading.raw)?;
     calibrate(&mut stored, reading.unit.unwrap_or(GreyUnit::Native), path)?;
-    let mut notes = stored.notes;
+    let (mut notes, mut warnings) = (stored.notes, Vec::new());
     let found = stored.spacing_mm;
     let Some(spacing) = found.or(spacing_mm) else {
         return Err(Error::file(
@@ -95,7 +97,7 @@ pub fn read_as(path: &Path, reading: &Reading) -> Result<Scan> {
     let file_affine = volume.affine;
     let file_spacing_mm = found.map(|_| volume.grid.spacing_mm);
     if let Some(wanted) = spacing_mm {
-        respace(&mut volume, wanted, found.is_some(), &mut notes);
+        warnings.extend(respace(&mut volume, wanted, found.is_some()));
     }
     Ok(Scan {
         name: name(path),
@@ -110,6 +112,7 @@ pub fn read_as(path: &Path, reading: &Reading) -> Result<Scan> {
         file_affine,
         details: stored.details,
         notes,
+        warnings,
     })
 }
 
@@ -303,19 +306,10 @@ fn checked_spacing(s: [f64; 3]) -> Result<[f64; 3]> {
     ))
 }
 
-/// How a note begins that says that the file's voxel size was overruled.
-pub const REPLACED: &str = "voxel size replaced";
-
-fn respace(volume: &mut Volume<f32>, wanted: [f64; 3], known: bool, notes: &mut Vec<String>) {
+/// Gives the voxels another size. A warning where the file's is `known` and differs.
+fn respace(volume: &mut Volume<f32>, wanted: [f64; 3], known: bool) -> Option<String> {
     let old = volume.grid.spacing_mm;
-    if known && (0..3).any(|a| (old[a] / wanted[a] - 1.0).abs() > 1e-3) {
-        let words = |s: [f64; 3]| s.map(|v| v.to_string()).join(" × ");
-        notes.push(format!(
-            "{REPLACED}: the file says {} mm, {} mm are taken as asked (--spacing)",
-            words(old),
-            words(wanted)
-        ));
-    }
+    let differs = known && (0..3).any(|a| (old[a] / wanted[a] - 1.0).abs() > 1e-3);
     if let Some(affine) = &mut volume.affine {
         for row in affine {
             for a in 0..3 {
@@ -324,6 +318,14 @@ fn respace(volume: &mut Volume<f32>, wanted: [f64; 3], known: bool, notes: &mut 
         }
     }
     volume.grid.spacing_mm = wanted;
+    let words = |s: [f64; 3]| s.map(|v| v.to_string()).join(" × ");
+    differs.then(|| {
+        format!(
+            "voxel size replaced: the file says {} mm, {} mm are taken as asked (--spacing, spacing_mm)",
+            words(old),
+            words(wanted)
+        )
+    })
 }
 
 /// The scan's name: that of the file or folder, without extensions that formats add.

@@ -52,7 +52,7 @@ fn try_write(
         _ => Path::new("."),
     };
     std::fs::create_dir_all(dir)?;
-    let mut file = temporary(dir, "")?;
+    let mut file = temporary(dir)?;
     let mut out = BufWriter::with_capacity(1 << 20, file.as_file_mut());
     fill(&mut out)?;
     out.flush()?;
@@ -61,10 +61,10 @@ fn try_write(
 }
 
 /// A temporary file of `dir`, locked as long as its writer lives (on Unix; elsewhere a lock keeps out its own writer, too).
-pub fn temporary(dir: &Path, suffix: &str) -> std::io::Result<NamedTempFile> {
+fn temporary(dir: &Path) -> std::io::Result<NamedTempFile> {
     loop {
         let mut builder = tempfile::Builder::new();
-        let file = builder.prefix(PREFIX).suffix(suffix).tempfile_in(dir)?;
+        let file = builder.prefix(PREFIX).tempfile_in(dir)?;
         // File systems without locks refuse them to `sweep`, too.
         if cfg!(unix) {
             let _ = file.as_file().lock();
@@ -91,10 +91,6 @@ pub fn sweep(dir: &Path) {
 }
 
 /// Syncs a finished temporary file (of the same folder) and gives it its name.
-pub fn keep(file: NamedTempFile, path: &Path) -> Result<()> {
-    persist(file, path).map_err(|e| unwritable(path, &e))
-}
-
 fn persist(file: NamedTempFile, path: &Path) -> std::io::Result<()> {
     readable_by_all(file.as_file())?;
     file.as_file().sync_all()?;
@@ -154,12 +150,12 @@ mod tests {
         let left = dir.path().join(".writing-Ab3xYz");
         std::fs::write(&left, "half a table").unwrap();
         std::fs::write(dir.path().join(".hidden"), "of the user").unwrap();
-        let mut living = temporary(dir.path(), "").unwrap();
+        let mut living = temporary(dir.path()).unwrap();
         sweep(dir.path());
         assert!(!left.exists() && living.path().exists());
         living.write_all(b"whole").unwrap();
         let path = dir.path().join("whole");
-        keep(living, &path).unwrap();
+        persist(living, &path).unwrap();
         sweep(dir.path());
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "whole");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);

@@ -7,6 +7,7 @@ pub mod regrid;
 pub mod resample;
 pub mod rotate;
 pub mod threshold;
+pub mod unmeasured;
 pub mod upsample;
 pub mod usable;
 pub mod voi;

@@ -46,7 +46,7 @@ pub fn write(dir: &Path, specimen: &Specimen, record: &SegmentRecord) -> Result<
     let bone = specimen.bone.clone();
     nifti::write(&dir.join(MASK), &orient::turned(bone, &back))?;
     match &specimen.grey {
-        Some(grey) => nifti::write(&dir.join(GREY), &orient::turned(grey.clone(), &back))?,
+        Some(grey) => nifti::write_grey(&dir.join(GREY), &orient::turned(grey.clone(), &back))?,
         None => drop(std::fs::remove_file(dir.join(GREY))),
     }
     let inside = specimen.threshold.as_ref().and_then(|t| t.inside.as_ref());

@@ -230,3 +230,70 @@ fn tifffiles_shape_of_four_axes_is_refused() {
         .unwrap_err();
     assert!(words.contains("shape [2, 2, 3, 4]"), "{words}");
 }
+
+#[test]
+fn ome_attributes_are_read_however_they_are_written() {
+    let plain = String::from_utf8(ome(&[], "")).unwrap();
+    let micro =
+        " PhysicalSizeXUnit=\"&#181;m\" PhysicalSizeYUnit=\"&#xB5;m\" PhysicalSizeZUnit=\"µm\">";
+    for (kind, text) in [
+        (
+            "entities",
+            plain.replacen("\"></Pixels", &format!("\"{micro}</Pixels"), 1),
+        ),
+        ("single quotes", plain.replace('"', "'")),
+        (
+            "line breaks",
+            plain.replace(" PhysicalSize", "\n\tPhysicalSize"),
+        ),
+    ] {
+        assert_ne!(text, plain, "{kind}");
+        let found = size(stack(text.as_bytes(), 3));
+        assert_eq!(found, Some([0.02, 0.04, 0.06]), "{kind}");
+    }
+    // Without sizes of its own the resolution tags are left: 50 and 25 pixels a centimetre.
+    let bare = plain.replace(" PhysicalSize", " Other");
+    let mut page = Page::grey(4, 3, vec![1; 12])
+        .with(
+            270,
+            Value::Ascii(bare.replace("SizeZ=\"3\"", "SizeZ=\"1\"").into()),
+        )
+        .with(282, Value::Rational(50_000, 100))
+        .with(283, Value::Rational(25_000, 100));
+    page = page.with(296, Value::Short(vec![3]));
+    let (_dir, path) = file("a.tif", &tiff(&[page], Order::default()));
+    let found = scan::stored(&path).unwrap().spacing_mm.unwrap();
+    assert!((found[0] - 0.02).abs() < 1e-9, "{found:?}");
+}
+
+#[test]
+fn a_depth_that_imagej_leaves_out_is_one_and_its_sign_does_not_count() {
+    assert_eq!(size(imagej("unit=mm\n")), Some([0.02, 0.04, 1.0]));
+    assert_eq!(size(imagej("unit=um\n")), Some([2e-5, 4e-5, 0.001]));
+    let negative = imagej("unit=mm\nspacing=-0.06\n");
+    assert_eq!(size(negative), Some([0.02, 0.04, 0.06]));
+}
+
+#[test]
+fn a_stack_of_times_alone_is_one_of_slices() {
+    let found = stack(
+        b"ImageJ=1.54f\nimages=3\nframes=3\nunit=mm\nspacing=0.06\n",
+        3,
+    )
+    .unwrap();
+    assert_eq!(
+        (found.n, found.spacing_mm),
+        ([4, 3, 3], Some([0.02, 0.04, 0.06]))
+    );
+    assert!(
+        found.notes.join("").contains("read as slices"),
+        "{:?}",
+        found.notes
+    );
+    let both = stack(b"ImageJ=1.54f\nimages=4\nslices=2\nframes=2\n", 4);
+    assert!(
+        both.map(|s| s.n)
+            .unwrap_err()
+            .contains("2 slices and 2 frames")
+    );
+}

@@ -196,3 +196,39 @@ fn a_mask_fits_a_scan_whose_voxel_size_was_overruled() {
         assert_eq!(*found, marked(*value as usize));
     }
 }
+
+/// Directions without a voxel size say no place: they turn the mask, and corners are not compared.
+#[test]
+fn a_mask_with_directions_and_no_voxel_size_is_turned_and_not_placed() {
+    use crate::written::text::Header;
+    let turn = Turn {
+        from: [2, 0, 1],
+        reversed: [true, false, true],
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let path = scan_of(dir.path(), &turn);
+    // The mask's axes are those of the scan: columns of the affine without their length, from RAS to LPS.
+    let rows = affine(&turn, [0.0; 3]);
+    let axis = |a: usize| [-rows[0][a], -rows[1][a], rows[2][a]].map(|v| v / H[a]);
+    let matrix: Vec<String> = (0..3).flat_map(axis).map(|v| v.to_string()).collect();
+    let mut header = Header::new(&[
+        ("NDims", "3"),
+        ("DimSize", "5 4 3"),
+        ("ElementType", "MET_UCHAR"),
+        ("Offset", "70 80 90"),
+        ("TransformMatrix", &matrix.join(" ")),
+        ("ElementDataFile", "LOCAL"),
+    ]);
+    let voxels: Vec<u8> = (0..60).map(|i| marked(i) as u8).collect();
+    let mask = dir.path().join("m.mha");
+    std::fs::write(&mask, [header.metaimage(), voxels.clone()].concat()).unwrap();
+    let (values, found, notes) = lay(&path, &mask).unwrap();
+    for (value, found) in values.iter().zip(&found) {
+        assert_eq!(*found, marked(*value as usize));
+    }
+    assert!(notes[0].contains("has no voxel size"), "{notes:?}");
+    header.set("ElementSpacing", "0.02 0.03 0.05");
+    std::fs::write(&mask, [header.metaimage(), voxels].concat()).unwrap();
+    let words = lay(&path, &mask).map(|_| ()).unwrap_err();
+    assert!(words.contains("mm off the scan's"), "{words}");
+}

@@ -89,9 +89,36 @@ fn sizes_no_scan_has_are_warned_of_or_refused_with_the_likely_slip() {
     let (code, said) = segment([19.5; 3], grey, &["--lower", "0", "--spacing", "0.0195"]);
     assert!(
         code == Some(0)
-            && said.contains("note: a: voxel size replaced: the file says 19.5 × 19.5 × 19.5 mm"),
+            && said
+                .contains("warning: a: voxel size replaced: the file says 19.5 × 19.5 × 19.5 mm"),
         "{said}"
     );
+}
+
+#[test]
+fn a_voxel_size_that_overrules_the_files_is_warned_of_and_stands_in_the_record() {
+    let dir = tempfile::tempdir().unwrap();
+    write(&dir.path().join("a.nii"), CUBE, grey);
+    for (spacing, warned) in [("0.03", true), ("0.02,0.02,0.021", true), ("0.02", false)] {
+        let words = ["segment", "a.nii", "-o", "out", "--lower", "0", "--quiet"];
+        let (code, said) = program(dir.path(), &[&words[..], &["--spacing", spacing]].concat());
+        assert_eq!(code, Some(0), "{said}");
+        let words = "voxel size replaced: the file says 0.02 × 0.02 × 0.02 mm";
+        assert_eq!(
+            said.contains(&format!("warning: a: {words}")),
+            warned,
+            "{said}"
+        );
+        let record = std::fs::read_to_string(dir.path().join("out/segment.json")).unwrap();
+        let record: serde_json::Value = serde_json::from_str(&record).unwrap();
+        let warnings = record["results"]["warnings"].as_array().unwrap();
+        let found = warnings.iter().filter_map(|w| w.as_str());
+        assert_eq!(
+            found.filter(|w| w.starts_with(words)).count() == 1,
+            warned,
+            "{spacing}"
+        );
+    }
 }
 
 #[test]

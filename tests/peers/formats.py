@@ -1,6 +1,6 @@
 """Files written by independent software, read by bonepd-ct: geometry, orientation, units, and a block of bone voxel by voxel of its mask.
 
-    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom pynrrd tifffile imagecodecs Pillow aimio-py numpy
+    python -m venv /tmp/peers && /tmp/peers/bin/pip install nibabel SimpleITK pydicom pynrrd tifffile imagecodecs Pillow aimio-py scipy numpy
     /tmp/peers/bin/python tests/peers/formats.py target/release/bonepd-ct
 
 A writer that is not installed is skipped with its reason. Exit code 1 if anything differs.
@@ -8,12 +8,14 @@ A writer that is not installed is skipped with its reason. Exit code 1 if anythi
 
 import importlib
 import json
+import os
 import pathlib
 import struct
 import subprocess
 import sys
 import tempfile
 
+import more_formats
 import numpy as np
 
 PROGRAM = sys.argv[1] if len(sys.argv) > 1 else "target/release/bonepd-ct"
@@ -26,7 +28,7 @@ FAILED = []
 
 
 def ask(*words):
-    done = subprocess.run([PROGRAM, *map(str, words), "--json"], capture_output=True, text=True)
+    done = subprocess.run([PROGRAM, *map(str, words), "--json"], capture_output=True, encoding="utf-8")
     if done.returncode != 0:
         raise RuntimeError(done.stderr.strip())
     return json.loads(done.stdout)
@@ -649,17 +651,41 @@ def aim_v1(size):
     return struct.pack("<4i", 16, size, 0, GREY.nbytes) + bytes(header) + GREY.tobytes()
 
 
+def in_own_process(group, more):
+    """What failed. A group has a process to itself: libraries that bring their own libtiff or change the locale disturb others."""
+    sys.stdout.flush()
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        FAILED.clear()
+        with tempfile.TemporaryDirectory() as dir:
+            try:
+                group(pathlib.Path(dir), *more)
+            except Exception as e:
+                FAILED.append(group.__name__)
+                print(f"FAILED   {group.__name__}: {type(e).__name__}: {e}")
+        sys.stdout.flush()
+        os.write(writer, json.dumps(FAILED).encode())
+        os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader) as failed:
+        words = failed.read()
+    _, status = os.waitpid(child, 0)
+    if status != 0:
+        print(f"FAILED   {group.__name__}: its process ended by {status}")
+        return [group.__name__]
+    return json.loads(words)
+
+
 def main():
     if not needs("nibabel"):
         print("nothing can be checked without nibabel, which reads our masks")
         return 0
-    for group in (nibabel_files, simpleitk_files, pynrrd_files, pydicom_files, tifffile_files, numpy_files, pillow_files, aim_files):
-        with tempfile.TemporaryDirectory() as dir:
-            try:
-                group(pathlib.Path(dir))
-            except Exception as e:
-                FAILED.append(group.__name__)
-                print(f"FAILED   {group.__name__}: {type(e).__name__}: {e}")
+    here = sys.modules[__name__]
+    own = (nibabel_files, simpleitk_files, pynrrd_files, pydicom_files, tifffile_files, numpy_files, pillow_files, aim_files)
+    groups = [(group, ()) for group in own] + [(group, (here,)) for group in more_formats.GROUPS]
+    for group, more in groups:
+        FAILED.extend(in_own_process(group, more))
     print(f"{len(FAILED)} failed" if FAILED else "all agree")
     return 1 if FAILED else 0
 

@@ -38,6 +38,24 @@ pub fn name(syntax: &str) -> String {
     )
 }
 
+/// The program that undoes a compression which is not read.
+pub fn way_out(syntax: &str) -> &'static str {
+    match name(syntax).split(',').next() {
+        Some("JPEG-LS") => {
+            "decompress each file (dcmdjpls IN OUT of DCMTK, or gdcmconv --raw IN OUT of GDCM), or convert the series to NIfTI (dcm2niix)"
+        }
+        Some("JPEG 2000") => {
+            "decompress each file (gdcmconv --raw IN OUT of GDCM), or convert the series to NIfTI (dcm2niix)"
+        }
+        Some("HTJ2K") => {
+            "decompress each file (in Python, pydicom with pylibjpeg-openjpeg: ds = pydicom.dcmread(IN); ds.decompress(); ds.save_as(OUT)), or export the series again as uncompressed DICOM"
+        }
+        _ => {
+            "decompress each file (gdcmconv --raw IN OUT of GDCM), or export the series again as uncompressed DICOM"
+        }
+    }
+}
+
 pub fn codec(syntax: &str) -> Option<Codec> {
     match name(syntax).split_whitespace().next() {
         Some("RLE") => Some(Codec::Rle),

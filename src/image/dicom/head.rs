@@ -97,8 +97,11 @@ fn codec(syntax: &str, path: &Path) -> Result<Codec> {
     compressed::codec(syntax).ok_or_else(|| {
         Error::file(
             path,
-            format!("is compressed as {}, which is not read", compressed::name(syntax)),
-            "decompress it (gdcmconv --raw IN OUT, or for JPEG dcmdjpeg), or convert the series to NIfTI (dcm2niix)",
+            format!(
+                "is compressed as {}, which is not read",
+                compressed::name(syntax)
+            ),
+            compressed::way_out(syntax),
         )
     })
 }

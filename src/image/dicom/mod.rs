@@ -38,8 +38,8 @@
 //! | (0028,0102) HighBit | read | place of the stored bits |
 //! | (0028,0103) PixelRepresentation | read | sign |
 //! | (0028,0106) SmallestImagePixelValue | harmless | of the values |
-//! | (0028,0120) PixelPaddingValue | read | passed on as padding |
-//! | (0028,0121) PixelPaddingRangeLimit | read | passed on as padding |
+//! | (0028,0120) PixelPaddingValue | read | no measurement: pore, and no part of Otsu's histogram |
+//! | (0028,0121) PixelPaddingRangeLimit | read | the other end of a range of padding |
 //! | (0028,1050) WindowCenter | harmless | of a display |
 //! | (0028,1052) RescaleIntercept | read | scale, slice by slice |
 //! | (0028,1053) RescaleSlope | read | scale, slice by slice |
@@ -112,10 +112,7 @@ pub fn read(folder: &Path, files: &[PathBuf]) -> Result<Stored> {
         affine: affine(first, spacing_mm),
         spacing_mm,
         unit: first.scale.unit.clone(),
-        padding: image.padding.map(|range| {
-            let [a, b] = range.map(|v| first.scale.value(f64::from(v)));
-            [a.min(b), a.max(b)]
-        }),
+        padding: padding(&images, &frames, &mut notes),
         notes,
         ..Stored::default()
     })
@@ -201,6 +198,25 @@ fn further(images: &[Image]) -> Vec<String> {
         notes.push("the series names a further scale of its values (RealWorldValueMapping), which is not used".into());
     }
     notes
+}
+
+/// Padding in the unit of the values. None, and said, where slices disagree or a table gives padding and measurements one value.
+fn padding(images: &[Image], frames: &[Frame], notes: &mut Vec<String>) -> Option<[f32; 2]> {
+    let of = |frame: &Frame| {
+        let range = images[frame.file].padding?;
+        let [a, b] = range.map(|v| frame.scale.value(f64::from(v)));
+        Some([a.min(b), a.max(b)])
+    };
+    let first = of(&frames[0])?;
+    if frames[0].scale.table.is_some() {
+        notes.push("PixelPaddingValue is not used: values come from a table (Modality LUT)".into());
+        return None;
+    }
+    if frames.iter().any(|frame| of(frame) != Some(first)) {
+        notes.push("PixelPaddingValue is not used: it differs from slice to slice".into());
+        return None;
+    }
+    Some(first)
 }
 
 /// Where the spacing is unknown the columns are unit vectors.

@@ -53,12 +53,13 @@
 //! | \[orient\] | refused | other planes than 0, which Analyze's programs read differently |
 //! | \[originator\] | harmless | place of SPM's origin |
 
+mod gzip;
 mod header;
 mod place;
 mod write;
 
 pub use header::decimal;
-pub use write::write;
+pub use write::{Voxel, write, write_grey};
 
 use crate::error::{Error, Result};
 use crate::format::raw::{self, Layout, Scalar};

@@ -1,16 +1,47 @@
-//! Owns the writing of NIfTI-1: masks and fields, in millimetres.
+//! Owns the writing of NIfTI-1: masks, grey values and fields, in millimetres.
 
+use super::gzip;
 use crate::error::{Error, Result};
+use crate::io::atomic;
 use crate::volume::Volume;
-use nifti::{NiftiHeader, writer::WriterOptions};
+use std::io::Write;
 use std::path::Path;
+
+/// A number that a voxel may be, with NIfTI's number of its type (`nifti1.h`).
+pub trait Voxel: bytemuck::Pod + Sync {
+    const CODE: i16;
+}
+
+impl Voxel for u8 {
+    const CODE: i16 = 2;
+}
+
+impl Voxel for i16 {
+    const CODE: i16 = 4;
+}
+
+impl Voxel for i32 {
+    const CODE: i16 = 8;
+}
+
+impl Voxel for f32 {
+    const CODE: i16 = 16;
+}
+
+impl Voxel for f64 {
+    const CODE: i16 = 64;
+}
+
+impl Voxel for u16 {
+    const CODE: i16 = 512;
+}
 
 /// Writes `volume` on its grid, in millimetres; compressed when the name ends in `.gz`. Fields and masks carry the
 /// scan's affine, so that they lie over it in any viewer.
-pub fn write<T>(path: &Path, volume: &Volume<T>) -> Result<()>
-where
-    T: nifti::DataElement + bytemuck::Pod,
-{
+///
+/// # Errors
+/// More voxels a side than the format holds; a folder that cannot be written to, a full disk.
+pub fn write<T: Voxel>(path: &Path, volume: &Volume<T>) -> Result<()> {
     let n = volume.grid.n;
     if n.iter().any(|&n| n > 32_767) {
         return Err(Error::file(
@@ -22,38 +53,51 @@ where
             "crop the scan first",
         ));
     }
-    let failed = |e: &dyn std::fmt::Display| {
-        Error::file(
-            path,
-            format!("cannot be written: {e}"),
-            "check that the folder exists, is writable and has space left",
-        )
-    };
-    let dir = path
-        .parent()
-        .filter(|d| !d.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    crate::io::atomic::create_dir(dir)?;
+    let header = header_of(volume);
+    let voxels: &[u8] = bytemuck::cast_slice(volume.as_slice());
     let gz = path.extension().is_some_and(|e| e == "gz");
-    // The crate writes by name and eats dots in stems: a plain temporary name, then rename.
-    let suffix = if gz { ".nii.gz" } else { ".nii" };
-    let file = crate::io::atomic::temporary(dir, suffix).map_err(|e| failed(&e))?;
-    WriterOptions::new(file.path())
-        .reference_header(&header_of(volume))
-        .write_nifti(&volume.values.t())
-        .map_err(|e| failed(&e))?;
-    let written = std::fs::metadata(file.path())
-        .map_err(|e| failed(&e))?
-        .len();
-    let whole = 352 + (volume.grid.len() * std::mem::size_of::<T>()) as u64;
-    if !gz && written != whole {
-        // The crate drops the error of its last flush: a full disk shows only in the size.
-        return Err(failed(&format!("{written} of {whole} bytes went out")));
-    }
-    crate::io::atomic::keep(file, path)
+    atomic::write_with(path, |out| match gz {
+        true => gzip::write(out, &[&header, voxels]),
+        false => out.write_all(&header).and_then(|()| out.write_all(voxels)),
+    })
 }
 
-fn header_of<T>(volume: &Volume<T>) -> NiftiHeader {
+/// Grey values: where all are whole numbers of 16 bits, as those, which takes half the space and time.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_grey(path: &Path, volume: &Volume<f32>) -> Result<()> {
+    if let Some(values) = whole::<i16>(volume) {
+        return write(path, &values);
+    }
+    if let Some(values) = whole::<u16>(volume) {
+        return write(path, &values);
+    }
+    write(path, volume)
+}
+
+/// The same values as integers, if all of them are.
+fn whole<T>(volume: &Volume<f32>) -> Option<Volume<T>>
+where
+    T: Voxel + Send + TryFrom<i32> + Into<f32>,
+{
+    use rayon::prelude::*;
+    let values = volume.as_slice().par_iter().with_min_len(1 << 14);
+    let integers: Option<Vec<T>> = values
+        .map(|&v| {
+            let integer = T::try_from(v as i32).ok()?;
+            let back: f32 = integer.into();
+            (back == v).then_some(integer)
+        })
+        .collect();
+    Some(Volume {
+        affine: volume.affine,
+        ..Volume::from_vec(volume.grid, integers?)
+    })
+}
+
+/// The header (348 bytes) and the four bytes after it that say that no extension follows.
+fn header_of<T: Voxel>(volume: &Volume<T>) -> [u8; 352] {
     let s = volume.grid.spacing_mm;
     let affine = volume.affine.unwrap_or([
         [s[0], 0.0, 0.0, 0.0],
@@ -62,27 +106,72 @@ fn header_of<T>(volume: &Volume<T>) -> NiftiHeader {
     ]);
     let straight = (0..3).all(|r| (0..3).all(|c| r == c || affine[r][c] == 0.0))
         && (0..3).all(|r| affine[r][r] > 0.0);
-    let [srow_x, srow_y, srow_z] = affine.map(|row| row.map(|v| v as f32));
-    NiftiHeader {
-        pixdim: [
-            1.0,
-            s[0] as f32,
-            s[1] as f32,
-            s[2] as f32,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        ],
-        xyzt_units: 2,
-        sform_code: 1,
-        qform_code: i16::from(straight),
-        quatern_x: srow_x[3],
-        quatern_y: srow_y[3],
-        quatern_z: srow_z[3],
-        srow_x,
-        srow_y,
-        srow_z,
-        ..NiftiHeader::default()
+    let mut header = [0u8; 352];
+    let mut put = |at: usize, bytes: &[u8]| header[at..at + bytes.len()].copy_from_slice(bytes);
+    let shorts =
+        |values: &[i16]| -> Vec<u8> { values.iter().flat_map(|v| v.to_ne_bytes()).collect() };
+    let floats = |values: &[f64]| -> Vec<u8> {
+        let single = values.iter().map(|v| *v as f32);
+        single.flat_map(f32::to_ne_bytes).collect()
+    };
+    let [nx, ny, nz] = volume.grid.n.map(|n| n as i16);
+    put(0, &348i32.to_ne_bytes());
+    put(40, &shorts(&[3, nx, ny, nz, 1, 1, 1, 1]));
+    put(70, &shorts(&[T::CODE, 8 * size_of::<T>() as i16]));
+    put(76, &floats(&[1.0, s[0], s[1], s[2]]));
+    // vox_offset, scl_slope.
+    put(108, &floats(&[352.0, 1.0]));
+    // Millimetres.
+    put(123, &[2]);
+    // The quaternion without a turn holds where the affine has none.
+    put(252, &shorts(&[i16::from(straight), 1]));
+    put(268, &floats(&affine.map(|row| row[3])));
+    put(280, &floats(affine.as_flattened()));
+    put(344, b"n+1\0");
+    header
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Grid;
+    use crate::image::scan;
+
+    #[test]
+    fn grey_values_are_kept_in_the_smallest_type_that_holds_them() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("grey.nii.gz");
+        let n = [50, 40, 30];
+        for (factor, offset, kind) in [
+            (1.0, -30_000.0, "int16"),
+            (1.0, 5000.0, "uint16"),
+            (2.0, 0.0, "float32"),
+            (0.5, 0.0, "float32"),
+            (-1.0, 0.0, "float32"),
+        ] {
+            let values = (0..60_000).map(|i| (i % 60_000) as f32 * factor + offset);
+            let mut volume = Volume::from_vec(Grid::new(n, [0.1, 0.2, 0.3]), values.collect());
+            volume.affine = Some([
+                [0.0, 0.2, 0.0, 5.0],
+                [0.1, 0.0, 0.0, -2.0],
+                [0.0, 0.0, 0.3, 1.0],
+            ]);
+            write_grey(&path, &volume).unwrap();
+            let found = scan::stored(&path).unwrap();
+            assert!(found.format.ends_with(kind), "{} {kind}", found.format);
+            assert_eq!((found.n, &found.values[..]), (n, volume.as_slice()));
+            let rows = found.affine.unwrap().into_iter().flatten();
+            let own = volume.affine.unwrap().into_iter().flatten();
+            assert!(rows.zip(own).all(|(a, b)| (a - b).abs() < 1e-6), "{kind}");
+        }
+    }
+
+    #[test]
+    fn values_that_are_no_numbers_stay_floats() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.nii");
+        let volume = Volume::from_vec(Grid::new([2, 1, 1], [0.1; 3]), vec![1.0, f32::NAN]);
+        write_grey(&path, &volume).unwrap();
+        assert!(scan::stored(&path).unwrap().values[1].is_nan());
     }
 }

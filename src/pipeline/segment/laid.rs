@@ -1,7 +1,8 @@
 //! Owns how a mask, labels or other values of one file are laid on the voxels of a scan from another.
 //!
-//! Where both files say how they lie in the world, places decide, and must agree. Where one of them does not, both were made from
-//! the same array: their axes as stored are the same, and the scan's turn is the other's, too.
+//! Where both files say how they lie in the world, places decide, and must agree. Where one of them has directions without a voxel
+//! size, directions decide. Where one has no directions, both were made from the same array: their axes as stored are the same, and
+//! the scan's turn is the other's, too.
 
 use crate::error::{Error, Result};
 use crate::format::orient::{self, Affine};
@@ -23,8 +24,18 @@ const ROUNDED: f64 = 0.01;
 pub fn on(scan: &Scan, path: &Path, notes: &mut Vec<String>) -> Result<Volume<f32>> {
     let stored = scan::stored(path)?;
     let grid = scan.volume.grid;
+    let sizes_known = stored.spacing_mm.is_some() && scan.file_spacing_mm.is_some();
     let volume = match (stored.affine, scan.file_affine) {
-        (Some(affine), Some(place)) => by_place(stored, affine, (place, grid), path)?,
+        (Some(affine), Some(place)) if sizes_known => {
+            by_place(stored, affine, (place, grid), path)?
+        }
+        (Some(directions), Some(_)) => {
+            notes.push(format!(
+                "{} was laid on the scan by the directions of its axes: one of the two has no voxel size, so their places are not compared",
+                shown(path)
+            ));
+            by_directions(stored, directions, grid, path)?
+        }
         (affine, place) => {
             let lacks = if place.is_none() { "the scan" } else { "it" };
             let turned = !scan.turn.is_identity() || affine.is_some_and(|a| !is_upright(&a));
@@ -94,6 +105,19 @@ fn by_place(
         };
         return Err(elsewhere(path, found));
     }
+    Ok(volume)
+}
+
+/// Directions without a voxel size are no place: corners lie nowhere.
+fn by_directions(
+    stored: Stored,
+    directions: Affine,
+    grid: Grid,
+    path: &Path,
+) -> Result<Volume<f32>> {
+    let own = Grid::new(stored.n, stored.spacing_mm.unwrap_or([1.0; 3]));
+    let (volume, _) = orient::canonical(own, stored.values, directions, &mut Vec::new());
+    same_number(volume.grid.n, grid.n, path)?;
     Ok(volume)
 }
 

@@ -15,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::mask::components::Components;
 use crate::mask::ends;
+use crate::mask::unmeasured::Hidden;
 use crate::mask::voi::Inside;
 use crate::measure::edge_blur::edge_blur_voxels;
 use crate::measure::morphometry::morphometry;
@@ -43,16 +44,16 @@ pub fn segment<'a>(
     params: &SegmentParams,
     voi_mask: Option<&'a Volume<u8>>,
 ) -> Result<Segmented<'a>> {
-    segment_padded(name, scan, params, voi_mask, None)
+    segment_measured(name, scan, params, voi_mask, None)
 }
 
-/// The same for a scan whose file says that values from the first to the second of `padding` stand for no measurement.
-pub fn segment_padded<'a>(
+/// The same for a scan in which voxels that are no measurement were hidden.
+pub fn segment_measured<'a>(
     name: &str,
     scan: &'a Volume<f32>,
     params: &SegmentParams,
     voi_mask: Option<&'a Volume<u8>>,
-    padding: Option<[f32; 2]>,
+    hidden: Option<&Hidden>,
 ) -> Result<Segmented<'a>> {
     params.check()?;
     let threshold = params.otsu || params.lower.is_some() || params.upper.is_some();
@@ -63,7 +64,7 @@ pub fn segment_padded<'a>(
             "give --lower (and --upper), --otsu, or the --labels of a segmented scan",
         ));
     }
-    let mut placed = place(scan, params, voi_mask, padding)?;
+    let mut placed = place(scan, params, voi_mask)?;
     let mut found = find(&placed, params)?;
     let plane_cut_mm = match params.plane_cut_mm {
         Some(tile_mm) => Some(cut(&mut placed, &mut found, params, tile_mm)?),
@@ -104,7 +105,8 @@ pub fn segment_padded<'a>(
         blur_voxels: specimen.threshold.as_ref().and_then(|t| t.blur_voxels),
         grey_min: f64::from(placed.grey.min),
         grey_max: f64::from(placed.grey.max),
-        non_finite_voxels: placed.grey.non_finite,
+        // Hidden voxels are not broken ones.
+        non_finite_voxels: hidden.map_or(placed.grey.non_finite, |h| h.non_finite),
         selected_voxels: found.selected,
         outside_voi_voxels: found.outside,
         components: found.components,
@@ -129,6 +131,9 @@ pub fn segment_padded<'a>(
         let voxels = grid.len() as u64;
         let padded = takes_padding(&placed.window, &placed.grey, voxels);
         summary.warnings.extend(padded);
+    }
+    if let Some(hidden) = hidden {
+        summary.say_hidden(hidden, params.takes_any(hidden.range));
     }
     Ok(Segmented {
         specimen,

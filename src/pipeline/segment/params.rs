@@ -113,6 +113,17 @@ impl SegmentParams {
         !self.otsu && (self.lower.is_some() || self.upper.is_some())
     }
 
+    /// Whether the window or the labels that were given hold a value of `range`.
+    pub fn takes_any(&self, [low, high]: [f32; 2]) -> bool {
+        let (low, high) = (f64::from(low), f64::from(high));
+        let labelled = |label: &i32| (low..=high).contains(&f64::from(*label));
+        let (lower, upper) = (self.lower, self.upper);
+        self.labels.iter().any(labelled)
+            || self.has_window()
+                && lower.is_none_or(|lower| lower <= high)
+                && upper.is_none_or(|upper| upper >= low)
+    }
+
     /// Whether grey values are kept beside the mask.
     pub fn keeps_grey(&self) -> bool {
         self.keep_grey || !self.no_grey

@@ -45,7 +45,6 @@ pub(super) fn place<'a>(
     scan: &'a Volume<f32>,
     params: &SegmentParams,
     voi_mask: Option<&'a Volume<u8>>,
-    padding: Option<[f32; 2]>,
 ) -> Result<Placed<'a>> {
     let mut scan = Cow::Borrowed(scan);
     let mut voi_mask = voi_mask.map(Cow::Borrowed);
@@ -78,7 +77,7 @@ pub(super) fn place<'a>(
         let near = |mask: Cow<Volume<u8>>| resampled(&grey_of(&mask), spacing, Between::Nearest);
         voi_mask = voi_mask.map(|mask| Cow::Owned(mask_of(&near(mask))));
     }
-    let grey = grey_range(&scan, padding)?;
+    let grey = grey_range(&scan)?;
     let mut placed = Placed {
         window: window(&scan, params, &grey)?,
         scan,

@@ -2,6 +2,7 @@
 
 use super::Rotation;
 use crate::error::{Error, Result};
+use crate::mask::unmeasured::Hidden;
 use crate::measure::morphometry::Morphometry;
 use serde::{Deserialize, Serialize};
 
@@ -53,6 +54,26 @@ pub struct SegmentSummary {
     #[serde(default)]
     pub notes: Vec<String>,
     pub warnings: Vec<String>,
+}
+
+impl SegmentSummary {
+    /// Says what became of voxels that the file marks as no measurement. `is_asked_for`: the window or the labels hold some
+    /// of their values.
+    pub(super) fn say_hidden(&mut self, hidden: &Hidden, is_asked_for: bool) {
+        let words = format!(
+            "{:.1} % of the voxels hold {}, which the file marks as padding (no measurement)",
+            100.0 * hidden.share(),
+            hidden.values()
+        );
+        match is_asked_for {
+            false => self.notes.push(format!(
+                "{words}: taken as pore, and left out of Otsu's threshold"
+            )),
+            true => self.warnings.push(format!(
+                "{words}: taken as pore, though the window or the labels take such values"
+            )),
+        }
+    }
 }
 
 /// What a scan says of the bone's surface within a voxel.

@@ -18,16 +18,15 @@ pub(super) struct Grey {
     pub measured: [f32; 2],
 }
 
-/// `padding`: values that stand for no measurement by the file's own word.
-pub(super) fn grey_range(scan: &Volume<f32>, padding: Option<[f32; 2]>) -> Result<Grey> {
+pub(super) fn grey_range(scan: &Volume<f32>) -> Result<Grey> {
     let values = scan.as_slice();
     let Some(ends) = usable::extremes(values) else {
         return Err(Error::specimen(
-            "no voxel has a finite grey value",
-            "check how the scan was exported",
+            "no voxel has a grey value that is a finite number and a measurement",
+            "check how the scan was exported, and its padding value (PixelPaddingValue)",
         ));
     };
-    let (padding, measured) = usable::padding(values, &ends, padding);
+    let (padding, measured) = usable::padding(values, &ends);
     Ok(Grey {
         min: ends.min,
         max: ends.max,
@@ -105,7 +104,7 @@ pub(super) fn takes_padding(window: &Window, grey: &Grey, voxels: u64) -> Option
     let taken = |p: &&Padding| (lower..=upper).contains(&f64::from(p.value));
     let p = grey.padding.iter().find(taken)?;
     Some(format!(
-        "the window takes {:.1} % of the voxels, which hold {}: padding, by the file's word or as it is far from all other values. Give --lower and --upper that leave it out",
+        "the window takes {:.1} % of the voxels, which hold {}: padding, as it is far from all other values. Give --lower and --upper that leave it out",
         100.0 * p.voxels as f64 / voxels.max(1) as f64,
         p.value
     ))

@@ -45,8 +45,8 @@ pub struct RunArgs {
     /// Run only the scan of this name: one job of many on a cluster
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
-    /// Choose method and resolution of each scan so that its stated error, algebraic and discretisation, stays below this,
-    /// as 3% or 0.03; exit 1 where it cannot be met
+    /// Choose the resolution of each scan so that its stated error (solver, elements, shape) stays below this, as 3% or 0.03;
+    /// exit 1 where it cannot be met
     #[arg(long, value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "lp", "boundary", "structure"])]
     error: Option<f64>,
     #[command(flatten)]

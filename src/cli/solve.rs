@@ -23,7 +23,7 @@ pub struct SolveArgs {
     settings: SolveSettings,
     #[command(flatten)]
     lattice: LatticeSettings,
-    /// Choose method and resolution so that the stated error, algebraic and discretisation, stays below this, as 3% or
+    /// Choose the resolution so that the stated error (solver, elements, shape) stays below this, as 3% or
     /// 0.03; exit 1 where it cannot be met
     #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "lp", "boundary", "structure"])]
     error: Option<f64>,

@@ -1,35 +1,69 @@
 //! Owns what can go wrong, worded for the person at the keyboard: where, what was found, what to do.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The error of a library that is behind one of this crate's, for callers that want its kind; its words stand in the message.
+pub type Source = Arc<dyn std::error::Error + Send + Sync>;
 
 /// Between what was found and what to do about it.
 pub const ADVICE: &str = "\n  what to do: ";
 
 /// Every failure the library reports. All of them end a command with exit code 2; a solve that did not converge is
 /// a marked result, not an error.
-#[derive(Debug, Clone, thiserror::Error)]
+#[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Error {
     /// A file or folder that cannot be read, understood or written.
-    #[error("{}: {found}{}{advice}", path.display(), ADVICE)]
     File {
         path: PathBuf,
         found: String,
         advice: String,
+        source: Option<Source>,
     },
     /// A setting (flag, recipe key or parameter) with an unusable value.
-    #[error("{key}: {found}{}{advice}", ADVICE)]
     Setting {
         key: String,
         found: String,
         advice: String,
+        source: Option<Source>,
     },
     /// A specimen or scene for which the request makes no sense.
-    #[error("{found}{}{advice}", ADVICE)]
-    Specimen { found: String, advice: String },
+    Specimen {
+        found: String,
+        advice: String,
+        source: Option<Source>,
+    },
 }
 
 pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Error::File {
+                path,
+                found,
+                advice,
+                ..
+            } => write!(f, "{}: {found}{ADVICE}{advice}", path.display()),
+            Error::Setting {
+                key, found, advice, ..
+            } => write!(f, "{key}: {found}{ADVICE}{advice}"),
+            Error::Specimen { found, advice, .. } => write!(f, "{found}{ADVICE}{advice}"),
+        }
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        let (Error::File { source, .. }
+        | Error::Setting { source, .. }
+        | Error::Specimen { source, .. }) = self;
+        source.as_ref().map(|cause| &**cause as _)
+    }
+}
 
 impl Error {
     /// `found` says what was expected and what was there; `advice` what to do.
@@ -42,6 +76,7 @@ impl Error {
             path: path.as_ref().to_path_buf(),
             found: found.into(),
             advice: advice.into(),
+            source: None,
         }
     }
 
@@ -54,6 +89,7 @@ impl Error {
             key: key.into(),
             found: found.into(),
             advice: advice.into(),
+            source: None,
         }
     }
 
@@ -61,6 +97,39 @@ impl Error {
         Error::Specimen {
             found: found.into(),
             advice: advice.into(),
+            source: None,
         }
+    }
+
+    /// The same with the error that is behind it.
+    #[must_use]
+    pub fn caused_by(mut self, cause: impl std::error::Error + Send + Sync + 'static) -> Self {
+        let (Error::File { source, .. }
+        | Error::Setting { source, .. }
+        | Error::Specimen { source, .. }) = &mut self;
+        *source = Some(Arc::new(cause));
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::error::Error as _;
+
+    #[test]
+    fn the_cause_is_kept_beside_the_words() {
+        let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
+        let error = Error::file("a.nii", "cannot be read", "check the path");
+        assert!(error.source().is_none());
+        let error = error.caused_by(missing);
+        let cause = error
+            .source()
+            .and_then(|e| e.downcast_ref::<std::io::Error>());
+        assert_eq!(cause.unwrap().kind(), std::io::ErrorKind::NotFound);
+        assert_eq!(
+            error.to_string(),
+            "a.nii: cannot be read\n  what to do: check the path"
+        );
     }
 }

@@ -15,6 +15,7 @@ mod header_keys;
 mod header_property;
 mod info;
 mod inputs;
+mod lattice_checks;
 mod laws;
 mod layers;
 mod molecular;

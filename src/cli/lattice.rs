@@ -22,7 +22,7 @@ pub struct LatticeArgs {
     #[command(flatten)]
     settings: LatticeSettings,
     /// Also write each lattice for another program: lammps (data file; bonds alone, so always of Poisson's ratio 0.25, where
-    /// `solve` takes 0.3 unless told otherwise), vtk (ParaView, OVITO)
+    /// the default of `solve` is 0.3), vtk (ParaView, OVITO)
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', value_parser = ["lammps", "vtk"])]
     export: Vec<String>,
     /// Of an exported model: different stiffnesses of bonds at most; more are rounded to the means of as many bins

@@ -97,9 +97,9 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
 /// A setting that cannot be used, with the line of the manifest that gives it.
 fn of_line(path: &Path, line: u64, e: Error) -> Error {
     match e {
-        Error::Setting { key, found, advice } => {
-            Error::file(path, format!("line {line}: {key}: {found}"), advice)
-        }
+        Error::Setting {
+            key, found, advice, ..
+        } => Error::file(path, format!("line {line}: {key}: {found}"), advice),
         other => other,
     }
 }

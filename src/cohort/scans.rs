@@ -201,6 +201,7 @@ fn listing(folder: &Path) -> Result<Vec<PathBuf>> {
             format!("cannot be listed: {e}"),
             "check the folder and its permissions",
         )
+        .caused_by(e)
     })?;
     let hidden = |p: &Path| {
         p.file_name()

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::image::extent;
 use crate::machine::host;
 use crate::pipeline::apparent::discretisation::{Cost, Known, Prepared, Resolution};
-use crate::pipeline::apparent::job::Job;
+use crate::pipeline::apparent::job::{Job, bone_connects};
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::{SolveParams, jobs};
 use crate::recipe::Recipe;
@@ -129,6 +129,8 @@ pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Re
         no_bone &= cost.bytes[0] == 0.0;
         time_s = time_s.zip(cost.time_s).map(|(a, b)| a + b);
     }
+    // A lattice may lose the path that the bone has.
+    let no_bone = no_bone && !bone_connects(specimen, params);
     Ok(Estimate {
         memory_mib: mib(BASE + bytes),
         time_s: if no_bone { Some(0.0) } else { time_s },

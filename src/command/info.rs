@@ -276,7 +276,7 @@ fn suggestion(info: &ScanInfo) -> Vec<String> {
     lines
 }
 
-/// Six significant digits, none in vain.
+/// Six significant digits, without trailing zeros.
 fn short(v: f64) -> f64 {
     if v == 0.0 || !v.is_finite() {
         return v;

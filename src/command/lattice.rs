@@ -38,7 +38,7 @@ pub struct Exports {
     pub bins: usize,
 }
 
-/// `lattice.json`: the settings `solve` finds there, and what they came to (nothing where `run` went straight on to the
+/// `lattice.json`: the settings `solve` finds there, and their counts (nothing where `run` went straight on to the
 /// solves).
 #[derive(Debug, Serialize, Deserialize)]
 struct Record {
@@ -133,7 +133,7 @@ pub fn lattice(
 }
 
 /// Writes `dir/lattice.json` for `solve` to find the settings there, without building a lattice: `solve` builds each
-/// once, and its rows tell what it came to.
+/// once, and its rows say what was found.
 pub fn remember(dir: &Path, params: &LatticeParams) -> Result<()> {
     params.check()?;
     write(dir, params, Vec::new())
@@ -211,8 +211,9 @@ pub fn settings(dir: &Path) -> Result<LatticeParams> {
     }
     let again = "run `bonepd-ct lattice` again, or delete the file";
     let text = std::fs::read(&path)
-        .map_err(|e| Error::file(&path, format!("cannot be read: {e}"), again))?;
-    let record: Record = serde_json::from_slice(&text)
-        .map_err(|e| Error::file(&path, format!("not a lattice record: {e}"), again))?;
+        .map_err(|e| Error::file(&path, format!("cannot be read: {e}"), again).caused_by(e))?;
+    let record: Record = serde_json::from_slice(&text).map_err(|e| {
+        Error::file(&path, format!("not a lattice record: {e}"), again).caused_by(e)
+    })?;
     Ok(record.settings)
 }

@@ -40,6 +40,7 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
             format!("expected a scene, could not read it: {e}"),
             "`pipelines/` has example scenes",
         )
+        .caused_by(e)
     })?;
     let mut scene = Scene::parse(&text, path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -57,7 +58,7 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
     }
     atomic::create_dir(out)?;
     atomic::sweep(out);
-    let begun = Instant::now();
+    let started = Instant::now();
     let fingerprint = fingerprint(&scene, &inputs);
     let mut writer = Writer::new(out, &scene.setting.output, folder, fingerprint, session);
     if !writer.goes_on() {
@@ -69,7 +70,7 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
         title: scene.setting.title.clone(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         unknowns_per_point: summary.unknowns as f64 / summary.points.max(1) as f64,
-        wall_s: begun.elapsed().as_secs_f64(),
+        wall_s: started.elapsed().as_secs_f64(),
         last: writer.last(),
         summary,
     };

@@ -20,12 +20,13 @@ use crate::pipeline::lattice::LatticeParams;
 use crate::record::results::Results;
 use crate::record::specimen;
 use crate::result::cautions;
-use crate::result::extrapolate::{is_extrapolated, with_extrapolated};
-use crate::result::ffb::with_ffb;
+use crate::result::derived::with_derived;
+use crate::result::extrapolate::is_extrapolated;
 use crate::result::row::{FailureLoad, Marks, Row};
 use crate::result::settings::{BoundaryRule, Settings};
 use crate::result::shape;
 use crate::result::shape::Image;
+use crate::result::voxel_check;
 use crate::solver::cg::CgStep;
 use crate::volume::{Specimen, Volume};
 use indicatif::ProgressBar;
@@ -173,10 +174,12 @@ impl OpenScan {
             fields.write(&self.dir)?;
             rows.push(row);
         }
-        let all = with_extrapolated(&with_ffb(&rows));
+        let known = self.results.solved();
+        let all = with_derived(&rows, &known);
         for row in all.iter().filter(|row| is_extrapolated(row)) {
             session.result(in_words(row));
         }
+        warn_of_contradictions(&rows, &known, session);
         Ok(all)
     }
 
@@ -307,6 +310,21 @@ impl OpenScan {
     }
 }
 
+/// Warns of the means and limits of all `known` rows whose error is not stated, under the conditions of the rows just solved.
+fn warn_of_contradictions(solved: &[Row], known: &[Row], session: &Session) {
+    let conditions: Vec<_> = solved
+        .iter()
+        .map(|row| row.key.without_discretisation())
+        .collect();
+    let mut derived = with_derived(known, known);
+    derived.retain(|row| {
+        row.key.is_derived() && conditions.contains(&row.key.without_discretisation())
+    });
+    for line in voxel_check::warnings(&derived) {
+        session.warn(line);
+    }
+}
+
 fn said_of_kept(is_kept: bool) -> &'static str {
     match is_kept {
         true => "  [solved before with the same settings: kept]",
@@ -351,7 +369,7 @@ pub fn export_inp(dir: &Path, params: &SolveParams, bins: usize, session: &Sessi
     Ok(())
 }
 
-/// Puts the specimen's morphometry beside its modulus.
+/// Adds the specimen's morphometry to the row.
 fn mark(row: &mut Row, measured: Option<&Morphometry>) {
     let marks = &mut row.marks;
     marks.tb_th_mm = measured.and_then(|m| Some(m.tb_th.as_ref()?.mean_mm));

@@ -187,6 +187,7 @@ pub fn read_brightness(path: &Path) -> Result<([usize; 2], Vec<f64>)> {
             format!("cannot be read as an image: {e}"),
             "give a PNG or BMP file",
         )
+        .caused_by(e)
     })?;
     let grey = picture.into_luma16();
     let (width, height) = grey.dimensions();

@@ -41,6 +41,7 @@ pub fn write(path: &Path, grey: &Volume<f32>, bone: &Volume<u8>) -> Result<()> {
                 format!("cannot be encoded: {e}"),
                 "report this as a bug",
             )
+            .caused_by(e)
         })?;
     atomic::write(path, png.into_inner())
 }

@@ -41,7 +41,7 @@ fn logarithmic(values: &[f64], most: usize) -> Vec<usize> {
     values.iter().map(bin).collect()
 }
 
-/// Means of the bins that hold something, numbered anew.
+/// Means of the bins that hold something, numbered again from 0.
 fn gathered(values: &[f64], raw: &[usize], bins: usize) -> Bins {
     let mut sums = vec![(0.0, 0u64); bins];
     for (v, &bin) in values.iter().zip(raw) {

@@ -14,7 +14,7 @@ pub fn write_with(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> std::io::Result<()>,
 ) -> Result<()> {
-    try_write(path, fill).map_err(|e| unwritable(path, &e))
+    try_write(path, fill).map_err(|e| unwritable(path, e))
 }
 
 /// Writes `bytes` to `path`.
@@ -24,23 +24,25 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
 
 /// Creates a folder and its parents.
 pub fn create_dir(path: &Path) -> Result<()> {
-    std::fs::create_dir_all(path).map_err(|e| unwritable(path, &e))
+    std::fs::create_dir_all(path).map_err(|e| unwritable(path, e))
 }
 
-fn unwritable(path: &Path, e: &std::io::Error) -> Error {
+fn unwritable(path: &Path, e: std::io::Error) -> Error {
     use std::io::ErrorKind::{QuotaExceeded, StorageFull};
     if [StorageFull, QuotaExceeded].contains(&e.kind()) {
         return Error::file(
             path,
             "cannot be written: the disk is full, or your quota is",
             "free some space and give the same command again: what is finished is kept, and it goes on from there",
-        );
+        )
+        .caused_by(e);
     }
     Error::file(
         path,
         format!("cannot be written: {e}"),
         "check that the folder exists, is writable and has space left, or choose another output",
     )
+    .caused_by(e)
 }
 
 fn try_write(

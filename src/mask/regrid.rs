@@ -4,7 +4,7 @@ use crate::grid::{Axis, Grid};
 use crate::volume::Volume;
 use rayon::prelude::*;
 
-/// How values between voxel centres are told.
+/// How values between voxel centres are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Between {
     /// Means over coarser voxels, straight lines between the centres of finer ones: grey values.

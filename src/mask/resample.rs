@@ -61,6 +61,15 @@ fn coarsened(mask: &Volume<u8>, factor: usize, value: impl Fn(usize) -> f32 + Sy
     means(mask.grid, blocks, std::array::from_fn(of), bone)
 }
 
+/// Edges in mm of the voxels that [`coarsen`] and [`block_means`] make: `factor` voxels long, less where an axis is not a multiple.
+pub fn block_edges_mm(fine: Grid, factor: usize) -> [f64; 3] {
+    let (coarse, edges) = (blocks(fine, factor), fine.spacing_mm);
+    std::array::from_fn(|a| match fine.n[a].is_multiple_of(factor) {
+        true => edges[a] * factor as f64,
+        false => coarse.spacing_mm[a],
+    })
+}
+
 /// The grid of voxels `factor` times as long in the same box.
 fn blocks(fine: Grid, factor: usize) -> Grid {
     let n: [usize; 3] = std::array::from_fn(|a| fine.n[a].div_ceil(factor));
@@ -155,6 +164,13 @@ mod tests {
                 assert!(parts.iter().all(whole), "{n} {factor}");
             }
         }
+    }
+
+    #[test]
+    fn blocks_that_do_not_fill_a_side_are_shorter() {
+        let edges = block_edges_mm(Grid::new([15, 16, 7], [0.02, 0.02, 0.03]), 2);
+        assert_eq!(edges[1], 0.04);
+        assert!((edges[0] - 0.0375).abs() < 1e-15 && (edges[2] - 0.0525).abs() < 1e-15);
     }
 
     #[test]

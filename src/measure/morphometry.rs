@@ -6,7 +6,7 @@ use crate::volume::Volume;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What is measured of a mask beside BV/TV.
+/// What is measured of a mask in addition to BV/TV.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Morphometry {
     /// Local thickness of bone (Tb.Th); None without bone.

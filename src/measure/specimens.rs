@@ -3,7 +3,7 @@
 use crate::grid::Grid;
 use crate::volume::Volume;
 
-/// 1 at the voxels, told by their indices along x, y, z, for which `bone` holds.
+/// 1 at the voxels for whose indices along x, y, z `bone` holds.
 pub fn mask(n: [usize; 3], spacing_mm: [f64; 3], bone: impl Fn([usize; 3]) -> bool) -> Volume<u8> {
     let grid = Grid::new(n, spacing_mm);
     let voxels =

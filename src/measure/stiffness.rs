@@ -1,4 +1,4 @@
-//! Owns what an apparent stiffness matrix tells: moduli along an axis, the best orthotropic frame and its constants.
+//! Owns what follows from an apparent stiffness matrix: moduli along an axis, the best orthotropic frame and its constants.
 //!
 //! Voigt order 11, 22, 33, 23, 13, 12 with engineering shears; MPa.
 

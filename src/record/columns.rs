@@ -205,7 +205,7 @@ const RESULTS: [Column; 47] = [
     column(
         "discretization_error_mpa",
         "MPa",
-        "estimated error of the resolution; of ffb half the gap between floppy and firm, which is a bracket",
+        "estimated error of the resolution; of ffb half the gap between floppy and firm, NA where they are shown to be no bracket",
     ),
     column(
         "wall_s",

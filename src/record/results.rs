@@ -8,8 +8,7 @@ use crate::machine::host;
 use crate::machine::session::Session;
 use crate::pipeline::apparent::SolveParams;
 use crate::record::specimen;
-use crate::result::extrapolate::with_extrapolated;
-use crate::result::ffb::with_ffb;
+use crate::result::derived::with_derived;
 use crate::result::row::Row;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -185,14 +184,15 @@ impl Results {
         self.write()
     }
 
+    /// The solved rows, of all settings.
+    pub fn solved(&self) -> Vec<Row> {
+        let keyed = self.record.rows.iter();
+        keyed.map(|keyed| keyed.row.clone()).collect()
+    }
+
     fn write(&self) -> Result<()> {
-        let solved: Vec<Row> = self
-            .record
-            .rows
-            .iter()
-            .map(|keyed| keyed.row.clone())
-            .collect();
-        let rows = with_extrapolated(&with_ffb(&solved));
+        let solved = self.solved();
+        let rows = with_derived(&solved, &solved);
         let mut solved = self.record.rows.iter();
         let keyed = |row: &Row| match row.key.is_derived() {
             true => KeyedRow {
@@ -232,6 +232,7 @@ impl Provenance {
                 format!("cannot be read: {e}"),
                 "run `bonepd-ct segment` first",
             )
+            .caused_by(e)
         })?;
         let segment = std::fs::read(dir.join(specimen::RECORD)).unwrap_or_default();
         Ok(Provenance {

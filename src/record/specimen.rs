@@ -73,14 +73,16 @@ pub fn axes(dir: &Path) -> Turn {
 pub fn load(dir: &Path) -> Result<Specimen> {
     let path = dir.join(RECORD);
     let again = "segment the scan first: bonepd-ct segment SCAN -o DIR --lower VALUE";
-    let text = std::fs::read_to_string(&path)
-        .map_err(|e| Error::file(&path, format!("no segmented scan here ({e})"), again))?;
+    let text = std::fs::read_to_string(&path).map_err(|e| {
+        Error::file(&path, format!("no segmented scan here ({e})"), again).caused_by(e)
+    })?;
     let record: SegmentRecord = serde_json::from_str(&text).map_err(|e| {
         Error::file(
             &path,
             format!("is no record of a segmentation ({e})"),
             again,
         )
+        .caused_by(e)
     })?;
     let mask = dir.join(MASK);
     let axes = record.input.axes;

@@ -69,9 +69,11 @@ pub fn read(path: &Path) -> Result<Six> {
             format!("expected a stiffness, could not read it: {e}"),
             advice,
         )
+        .caused_by(e)
     })?;
-    let file = serde_json::from_str(&text)
-        .map_err(|e| Error::file(path, format!("expected a 6 x 6 stiffness: {e}"), advice))?;
+    let file = serde_json::from_str(&text).map_err(|e| {
+        Error::file(path, format!("expected a 6 x 6 stiffness: {e}"), advice).caused_by(e)
+    })?;
     let (File::Bare(c) | File::Named { stiffness_mpa: c }) = file;
     Ok(std::array::from_fn(|i| {
         std::array::from_fn(|j| 0.5 * (c[i][j] + c[j][i]))

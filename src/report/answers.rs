@@ -92,7 +92,7 @@ fn explained(method: &str) -> &'static str {
             "a lattice of springs padded by one layer of sites around the bone; too stiff while struts are a few sites thick"
         }
         "ffb" => {
-            "the mean of the floppy lattice (sites in bone only, too soft) and the firm one (padded by a layer, too stiff) of one lattice parameter; ± is half the gap between them, and what the image leaves open about the surface"
+            "the mean of the floppy lattice (sites in bone only, too soft) and the firm one (padded by a layer, too stiff) of one lattice parameter; ± holds half the gap between them and what the image leaves open about the surface, and is left out where voxel FE or their order shows that they are no bracket"
         }
         "graded" => {
             "a lattice of springs that goes with the bone in each cell: a site for every connected component (SC), or sites weighted by bone fraction (BCC, FCC); one lattice parameter states no discretisation error"

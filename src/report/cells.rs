@@ -128,7 +128,7 @@ pub fn number(value: Option<f64>) -> Cell {
     }
 }
 
-/// A length in mm without digits in vain.
+/// A length in mm without trailing zeros.
 pub fn length(mm: f64) -> Cell {
     Cell {
         text: ((mm * 1e5).round() / 1e5).to_string(),

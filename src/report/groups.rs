@@ -259,7 +259,7 @@ fn paired(base: ComparisonLine, a: &Group, b: &Group) -> Option<ComparisonLine> 
         difference: found.bias,
         difference_low: interval.mean_low?,
         difference_high: interval.mean_high?,
-        p_t: found.bias_p,
+        p_t: found.bias_p?,
         ..base
     })
 }

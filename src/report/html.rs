@@ -109,6 +109,7 @@ pub fn render(report: &Report, pages: &[ScanPage], source: &Source) -> Result<St
             format!("the report's page could not be made: {e}"),
             "report this; the CSV files hold the same",
         )
+        .caused_by(e)
     })
 }
 

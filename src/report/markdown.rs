@@ -67,8 +67,9 @@ fn statistics_text(statistics: &Statistics) -> String {
         let [bias, low, high] =
             [found.bias, found.lower_limit, found.upper_limit].map(|v| digits(Some(v)));
         text += &format!(
-            "| {method} | {reference} | {} | {bias} | {low} to {high} | {:.2e} |\n",
-            found.n, found.bias_p
+            "| {method} | {reference} | {} | {bias} | {low} to {high} | {} |\n",
+            found.n,
+            found.bias_p.map_or("NA".to_owned(), |p| format!("{p:.2e}"))
         );
     }
     text

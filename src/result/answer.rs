@@ -36,7 +36,7 @@ pub struct AnswerLine {
     pub note: Option<String>,
 }
 
-/// What is known of a scan beside its rows.
+/// What is known of a scan apart from its rows.
 #[derive(Debug, Clone, Default)]
 pub struct ScanFacts {
     /// Of the volume along x, y, z.
@@ -47,7 +47,7 @@ pub struct ScanFacts {
     pub warnings: Vec<String>,
 }
 
-/// Order in which rows are answers: connected before not, converged before not, then the least stated error; among rows
+/// Order in which rows are answers: what carries load before what does not, converged before not, then the least stated error; among rows
 /// that state none the more exact method, then the finer.
 fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
     let exactness = match (row.key.method, row.key.boundary) {
@@ -58,7 +58,7 @@ fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
         _ => 4,
     };
     (
-        row.is_disconnected(),
+        row.carries_nothing(),
         row.converged() == Some(false),
         row.error().unwrap_or(f64::INFINITY),
         exactness,

@@ -6,10 +6,11 @@ use crate::result::notes;
 use crate::result::row::{Marks, Row, Solution};
 use crate::result::settings::{BoundaryRule, Settings};
 use crate::result::shape;
+use crate::result::voxel_check;
 
 /// The rows of `rows` with one FFB row after each pair of firm and floppy that differ in nothing else. FFB rows already
-/// there are replaced.
-pub fn with_ffb(rows: &[Row]) -> Vec<Row> {
+/// there are replaced. A row of voxel FE among `known` may show that a pair is no bracket.
+pub fn with_ffb(rows: &[Row], known: &[Row]) -> Vec<Row> {
     let mut all: Vec<Row> = Vec::new();
     for row in rows
         .iter()
@@ -17,7 +18,7 @@ pub fn with_ffb(rows: &[Row]) -> Vec<Row> {
     {
         all.push(row.clone());
         let partner = all.iter().find(|other| are_a_pair(row, other));
-        let mean = partner.map(|other| mean_row(row, other));
+        let mean = partner.map(|other| checked(mean_row(row, other), [row, other], known));
         all.extend(mean);
     }
     all
@@ -32,6 +33,24 @@ fn are_a_pair(a: &Row, b: &Row) -> bool {
     one_of_each && a.without_boundary() == b.without_boundary()
 }
 
+/// The mean states no error where its parts are no bracket.
+fn checked(mut mean: Row, parts: [&Row; 2], known: &[Row]) -> Row {
+    let part = |boundary| parts.into_iter().find(|r| r.key.boundary == Some(boundary));
+    let pair = part(BoundaryRule::FLOPPY).zip(part(BoundaryRule::FIRM));
+    let fault = pair.and_then(|(floppy, firm)| {
+        voxel_check::bracket_fault(floppy, firm, voxel_check::witness(&mean, known))
+    });
+    if let Some(why) = fault.filter(|_| mean.e_app_mpa().is_some()) {
+        voxel_check::state_no_error(&mut mean, &why);
+    }
+    mean
+}
+
+/// Whether one of the two carries no load and the other does: half of the other is no estimate.
+fn only_one_carries(a: &Row, b: &Row) -> bool {
+    a.carries_nothing() != b.carries_nothing()
+}
+
 /// Moduli are means, sites and times are sums, it is converged where both are; the rest is missing.
 fn mean_row(a: &Row, b: &Row) -> Row {
     let solved = a.solved.as_ref().zip(b.solved.as_ref());
@@ -41,7 +60,10 @@ fn mean_row(a: &Row, b: &Row) -> Row {
             ..a.key.clone()
         },
         solved: solved.map(|(s, t)| {
-            let mean = mean(s, t);
+            let mean = match only_one_carries(a, b) || a.is_no_answer() || b.is_no_answer() {
+                true => without_moduli(mean(s, t)),
+                false => mean(s, t),
+            };
             Solution {
                 shape_error_mpa: mean.e_app_mpa.zip(shape::of_lattice(a)).map(|(e, s)| s * e),
                 ..mean
@@ -73,6 +95,16 @@ fn mean(a: &Solution, b: &Solution) -> Solution {
     }
 }
 
+fn without_moduli(mean: Solution) -> Solution {
+    Solution {
+        e_app_mpa: None,
+        e_app_reaction_mpa: None,
+        e_app_stress_mpa: None,
+        discretization_error_mpa: None,
+        ..mean
+    }
+}
+
 /// None where it is not known of either.
 fn both_converged(a: &Solution, b: &Solution) -> Option<bool> {
     match (a.converged, b.converged) {
@@ -88,10 +120,15 @@ fn note(a: &Row, b: &Row) -> Option<String> {
     if parts().any(|row| row.converged() == Some(false)) {
         notes::add(&mut note, "mean of a modulus that is not converged");
     }
-    if a.is_disconnected() != b.is_disconnected() {
+    if parts().any(Row::is_no_answer) {
         notes::add(
             &mut note,
-            "warning: one of its parts carries no load: half of the other is no estimate",
+            "no mean: one of its lattices carries no load although the bone does",
+        );
+    } else if only_one_carries(a, b) {
+        notes::add(
+            &mut note,
+            "no mean: one of its lattices carries no load, and half of the other is no estimate",
         );
     }
     let all = parts().filter_map(|row| row.marks.note.as_deref());
@@ -136,7 +173,7 @@ mod tests {
             row(BoundaryRule::FLOPPY, 0.1, 10.0),
             row(BoundaryRule::GRADED, 0.1, 19.0),
         ];
-        let all = with_ffb(&rows);
+        let all = with_ffb(&rows, &[]);
         assert_eq!(all.len(), 5);
         let mean = &all[3];
         assert_eq!(mean.key.boundary, Some(BoundaryRule::Ffb));
@@ -160,7 +197,7 @@ mod tests {
                 part(BoundaryRule::FIRM, firm),
                 part(BoundaryRule::FLOPPY, floppy),
             ];
-            with_ffb(&rows)[2].converged()
+            with_ffb(&rows, &[])[2].converged()
         };
         let (yes, no) = (Some(true), Some(false));
         assert_eq!(
@@ -176,8 +213,43 @@ mod tests {
             row(BoundaryRule::FIRM, 0.1, 3.0),
             row(BoundaryRule::FLOPPY, 0.1, 1.0),
         ];
-        let once = with_ffb(&rows);
-        assert_eq!(with_ffb(&once), once);
+        let once = with_ffb(&rows, &[]);
+        assert_eq!(with_ffb(&once, &[]), once);
+    }
+
+    #[test]
+    fn firm_below_floppy_states_no_error() {
+        let rows = [
+            row(BoundaryRule::FLOPPY, 0.1, 62.0),
+            row(BoundaryRule::FIRM, 0.1, 45.0),
+        ];
+        let mean = &with_ffb(&rows, &[])[2];
+        assert_eq!((mean.e_app_mpa(), mean.error_mpa()), (Some(53.5), None));
+        let note = mean.marks.note.as_ref().unwrap();
+        assert!(
+            note.contains("warning: no error is stated: firm (45.000 MPa)"),
+            "{note}"
+        );
+    }
+
+    #[test]
+    fn no_mean_is_made_of_a_lattice_that_carries_nothing() {
+        let rows = |note: Option<&str>| {
+            let mut floppy = row(BoundaryRule::FLOPPY, 0.1, 0.0);
+            floppy.marks.note = note.map(str::to_owned);
+            with_ffb(&[floppy, row(BoundaryRule::FIRM, 0.1, 45.0)], &[])
+        };
+        let apart = rows(Some(notes::NO_ANSWER));
+        assert_eq!((apart[2].e_app_mpa(), apart[2].error_mpa()), (None, None));
+        let note = apart[2].marks.note.as_ref().unwrap();
+        assert!(note.contains("although the bone does"), "{note}");
+        assert!(!apart[0].is_disconnected() && apart[0].error_mpa().is_none());
+        let gap = rows(None);
+        assert_eq!(gap[2].e_app_mpa(), None);
+        assert!(gap[0].is_disconnected());
+        // No bone connects the faces: both are right.
+        let none = [BoundaryRule::FLOPPY, BoundaryRule::FIRM].map(|b| row(b, 0.1, 0.0));
+        assert_eq!(with_ffb(&none, &[])[2].e_app_mpa(), Some(0.0));
     }
 
     #[test]
@@ -185,7 +257,7 @@ mod tests {
         let mut stiffer = row(BoundaryRule::FLOPPY, 0.1, 1.0);
         stiffer.key.young_mpa = 2.0;
         assert_eq!(
-            with_ffb(&[row(BoundaryRule::FIRM, 0.1, 3.0), stiffer]).len(),
+            with_ffb(&[row(BoundaryRule::FIRM, 0.1, 3.0), stiffer], &[]).len(),
             2
         );
     }

@@ -3,6 +3,7 @@
 pub mod answer;
 pub mod cautions;
 pub mod condition;
+pub mod derived;
 pub mod extrapolate;
 pub mod ffb;
 pub mod notes;
@@ -10,3 +11,4 @@ pub mod row;
 pub mod settings;
 pub mod shape;
 pub mod statistics;
+pub mod voxel_check;

@@ -3,7 +3,10 @@
 use serde::Serialize;
 
 /// What divides the notes of one cell.
-const BETWEEN: &str = "; ";
+pub const BETWEEN: &str = "; ";
+
+/// In the note of a model that carries no load although the bone does.
+pub const NO_ANSWER: &str = "its E_app of 0 says nothing of the bone";
 
 /// Adds a note to a cell, once.
 pub fn add(cell: &mut Option<String>, note: &str) {

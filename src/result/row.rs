@@ -2,6 +2,7 @@
 
 mod columns;
 
+use crate::result::notes;
 use crate::result::settings::Settings;
 use columns::Columns;
 use serde::{Deserialize, Serialize};
@@ -111,7 +112,18 @@ impl Row {
 
     /// Whether no bone carries load from face to face: E_app is 0.
     pub fn is_disconnected(&self) -> bool {
+        self.carries_nothing() && !self.is_no_answer()
+    }
+
+    /// Whether the model carries no load, be it that of the bone or not.
+    pub fn carries_nothing(&self) -> bool {
         self.e_app_mpa() == Some(0.0)
+    }
+
+    /// Whether the model lost the path that the bone has, or has nothing to measure it by: its modulus of 0 is not the bone's.
+    pub fn is_no_answer(&self) -> bool {
+        let note = self.marks.note.as_deref();
+        note.is_some_and(|note| note.contains(notes::NO_ANSWER))
     }
 }
 

@@ -313,6 +313,16 @@ impl Settings {
         }
     }
 
+    /// The same of any method, resolution, place of the lattice and accuracy of the solver: what was done to which specimen.
+    pub fn without_discretisation(&self) -> Settings {
+        Settings {
+            method: Method::default(),
+            structure: CellType::default(),
+            boundary: None,
+            ..self.without_resolution()
+        }
+    }
+
     /// The same of any resolution, place of the lattice and accuracy of the solver.
     pub fn without_resolution(&self) -> Settings {
         Settings {

@@ -47,7 +47,7 @@ pub struct Stated {
     pub shape: f64,
 }
 
-/// What `--error` has learnt of a body beside the modulus that it states: all relative.
+/// What `--error` has found out about a body in addition to the modulus that it states: all relative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Learnt {
     /// `S` of one element a voxel.
@@ -77,7 +77,7 @@ pub fn of_interpolated(blur_voxels: f64, learnt: &Learnt) -> Stated {
     }
 }
 
-/// The error of one element a voxel, or of coarser ones, from what one solve tells.
+/// The error of one element a voxel, or of coarser ones, from one solve.
 ///
 /// `size` is the element's edge over the voxel's.
 pub fn of_one_solve(image: Image, elements: Elements, size: f64, surface: f64) -> Option<Stated> {

@@ -27,11 +27,8 @@ pub enum NotConverged {
     #[error("the iterations did not converge (residual {error:.1e})")]
     Diverged { error: f64 },
     /// The last update had to be cut to stay admissible, or left no number.
-    #[error(
-        "a density would go negative or an element turn inside out: bone is resorbed faster than its load sustains (set \
-         growth.least, raise the load, lower growth.stimulus, or end sooner), or the load changes too much at once"
-    )]
-    Vanishing,
+    #[error("the last update would leave the admissible range")]
+    Inadmissible,
     #[error("the tangent is singular or not positive definite")]
     Singular,
 }
@@ -40,7 +37,7 @@ impl NotConverged {
     /// Of iterations whose last update was `cut` to stay admissible, or not.
     pub fn after(error: f64, cut: bool) -> Self {
         match cut || !error.is_finite() {
-            true => NotConverged::Vanishing,
+            true => NotConverged::Inadmissible,
             false => NotConverged::Diverged { error },
         }
     }

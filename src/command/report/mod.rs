@@ -53,7 +53,7 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
         .and_then(|text| Recipe::parse(text, Path::new(RECIPE)).ok())
         .map_or_else(ReportParams::default, |recipe| recipe.report);
     // Means of older programs do not say whether they are converged.
-    let rows = with_ffb(&rows);
+    let rows = with_ffb(&rows, &rows);
     let answers = answers(&rows, dirs, None);
     let sources = Sources {
         rows: &rows,

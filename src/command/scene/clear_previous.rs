@@ -41,6 +41,7 @@ pub fn clear(out: &Path) -> Result<()> {
                 format!("is of an earlier scene and cannot be removed: {e}"),
                 "remove it by hand, or choose another folder with -o",
             )
+            .caused_by(e)
         })?;
     }
     Ok(())

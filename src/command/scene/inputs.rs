@@ -11,7 +11,7 @@ use crate::scene::setting::Inputs;
 use crate::scene::{Physics, Scene};
 use std::path::Path;
 
-/// Files that a scene's geometry names, relative to the scene file. `say` is told what a user should know of them.
+/// Files that a scene's geometry names, relative to the scene file. `say` is called with what a user should know of them.
 pub fn read(scene: &mut Scene, folder: &Path, say: impl Fn(String)) -> Result<Inputs> {
     match &mut scene.setting.geometry {
         Geometry::Polygon(polygon) => {

@@ -85,13 +85,6 @@ impl Frame {
             ));
         }
         let step_mm = lp_mm / structure.steps_per_lp();
-        let reach = 1.1 * structure.first_neighbour() * structure.steps_per_lp();
-        let ring = match boundary {
-            Boundary::Firm => reach.ceil() as usize - usize::from(structure == Structure::Sc),
-            // A strip narrower than a cell is left over sideways: its bone counts, too.
-            Boundary::Connected => 1,
-            Boundary::Floppy | Boundary::Weighted => 0,
-        };
         let (mut n, mut rings, mut first_mm) = ([0; 3], [0; 3], [0.0; 3]);
         for a in 0..3 {
             let length = grid.size_mm()[a];
@@ -114,8 +107,20 @@ impl Frame {
                     "give a smaller lattice parameter",
                 ));
             }
-            first_mm[a] = 0.5 * (length - (proper - 1) as f64 * step_mm) + registration_mm[a];
-            rings[a] = if loaded { 0 } else { ring };
+            let span = (proper - 1) as f64 * step_mm;
+            first_mm[a] = 0.5 * (length - span) + registration_mm[a];
+            rings[a] = match boundary {
+                _ if loaded => 0,
+                Boundary::Firm => {
+                    let bone = [0.5 * grid.spacing_mm[a], length - 0.5 * grid.spacing_mm[a]];
+                    let radius = near_bone::radius_mm(structure, lp_mm);
+                    let sites = [first_mm[a], first_mm[a] + span];
+                    rings_within(radius, bone, sites, step_mm).ok_or_else(|| too_many(lp_mm))?
+                }
+                // A strip narrower than a cell is left over sideways: its bone counts, too.
+                Boundary::Connected => 1,
+                Boundary::Floppy | Boundary::Weighted => 0,
+            };
             n[a] = proper + 2 * rings[a];
         }
         if n.iter().map(|&n| n as f64).product::<f64>() > MOST_PLACES {
@@ -171,6 +176,16 @@ impl Frame {
     pub fn planes(&self) -> usize {
         self.n[self.axis.index()]
     }
+}
+
+/// Rings of steps beyond the `sites` (first and last position along an axis, mm) that may lie within `radius_mm` of the voxel
+/// centres of `bone` (first and last, mm): as many on either side as the side with more needs. None where 32-bit numbers
+/// cannot count them.
+fn rings_within(radius_mm: f64, bone: [f64; 2], sites: [f64; 2], step_mm: f64) -> Option<usize> {
+    let below = sites[0] - (bone[0] - radius_mm);
+    let above = (bone[1] + radius_mm) - sites[1];
+    let rings = (below.max(above).max(0.0) / step_mm + 1e-9).floor();
+    (rings < f64::from(i32::MAX) / 4.0).then_some(rings as usize)
 }
 
 /// Weight of every candidate: 0 where no site exists, 1 for firm and floppy sites, the bone fraction for weighted ones.

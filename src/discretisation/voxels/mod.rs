@@ -65,6 +65,29 @@ impl Planes {
     }
 }
 
+/// Whether voxels (x fastest) for which `is_bone` holds join the grips by chains of shared nodes.
+pub fn connects<T: Sync>(
+    grid: Grid,
+    voxels: &[T],
+    is_bone: impl Fn(&T) -> bool + Sync,
+    grips: Planes,
+) -> bool {
+    between(&Runs::of(grid.n, voxels, is_bone), grips).voxels() > 0
+}
+
+/// The runs of the parts that reach from grip to grip.
+fn between(all: &Runs, grips: Planes) -> Runs {
+    let spans = |run: loaded::Run, y: usize, z: usize| match grips.axis {
+        Axis::X => [run.x0 as usize, run.x1 as usize],
+        Axis::Y => [y, y + 1],
+        Axis::Z => [z, z + 1],
+    };
+    all.spanning(
+        |run, y, z| spans(run, y, z)[0] <= grips.low,
+        |run, y, z| spans(run, y, z)[1] >= grips.high,
+    )
+}
+
 /// Bit of [`VoxelMesh::around`] of the element on the side of larger x, y, z.
 const LOW_CORNER_OF: u8 = 1 << 7;
 
@@ -93,16 +116,7 @@ impl VoxelMesh {
         grips: Planes,
     ) -> Result<Self> {
         let all = Runs::of(grid.n, voxels, is_bone);
-        let spans = |run: super::voxels::loaded::Run, y: usize, z: usize| match grips.axis {
-            Axis::X => [run.x0 as usize, run.x1 as usize],
-            Axis::Y => [y, y + 1],
-            Axis::Z => [z, z + 1],
-        };
-        let kept = all.spanning(
-            |run, y, z| spans(run, y, z)[0] <= grips.low,
-            |run, y, z| spans(run, y, z)[1] >= grips.high,
-        );
-        VoxelMesh::of(grid, &all, &kept)
+        VoxelMesh::of(grid, &all, &between(&all, grips))
     }
 
     /// Meshes the voxels for which `is_bone` holds and that are joined to a face of the grid.

@@ -69,7 +69,7 @@ impl Lattice {
         Lattice::of(sites, moduli, None)
     }
 
-    /// A lattice whose sites have volumetric moduli `w_i T` (N/mm) of their own, beside `w_i k_s`.
+    /// A lattice whose sites have volumetric moduli `w_i T` (N/mm) of their own, in addition to `w_i k_s`.
     pub fn with_volumetric(sites: Sites, moduli: Moduli, volumetric: Vec<f64>) -> Self {
         assert!(volumetric.len() == sites.len());
         Lattice::of(sites, moduli, Some(volumetric))

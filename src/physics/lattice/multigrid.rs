@@ -1,6 +1,6 @@
 //! Owns what multigrid sees of a lattice: its springs.
 //!
-//! The volumetric term reaches two bonds far and is small beside the springs unless tissue is nearly incompressible, so
+//! The volumetric term reaches two bonds far and is small compared with the springs unless tissue is nearly incompressible, so
 //! the preconditioner is built on the springs alone; conjugate gradients sees the whole lattice.
 
 use super::{Lattice, PORTION, range};

@@ -25,7 +25,7 @@ pub struct Prepared<'a> {
 
 /// A discretised specimen, ready to be loaded.
 pub trait Discretisation: Sized {
-    /// What tells one discretisation of this kind from another, beside the settings of the solve.
+    /// What distinguishes one discretisation of this kind from another, apart from the settings of the solve.
     type Case: Copy + Send + Sync + 'static;
 
     /// Fills in the settings of a row that say how the specimen is discretised.

@@ -1,5 +1,6 @@
 //! Owns one solve, whichever its discretisation: its row's columns, its cost, its solution.
 
+use crate::discretisation::voxels::{self, Planes};
 use crate::error::{Error, Result};
 use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision};
@@ -15,19 +16,35 @@ use crate::pipeline::apparent::stiffness::{Stiffness, stiffness};
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::result::settings::Settings;
 use crate::volume::Specimen;
-
-type Label = dyn Fn(&Specimen, &SolveParams, Settings) -> Settings + Send + Sync;
-type AskCost = dyn Fn(&SolveParams, Known) -> Result<Cost> + Send + Sync;
-type Solve = dyn Fn(Prepared, &SolveParams, &mut Observe) -> Result<JobResult> + Send + Sync;
+use std::ops::Deref;
 
 /// One solve to come.
-pub struct Job {
-    label: Box<Label>,
-    cost: Box<AskCost>,
-    solve: Box<Solve>,
+pub struct Job(Box<dyn Solve>);
+
+/// What a solve can be asked, whichever its discretisation.
+pub trait Solve: Send + Sync {
+    /// Fills in the settings of a row that say how the specimen is discretised.
+    fn label(&self, specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings;
+
+    /// What the solve takes.
+    ///
+    /// # Errors
+    /// Settings that do not fit the specimen.
+    fn cost(&self, params: &SolveParams, known: Known) -> Result<Cost>;
+
+    /// Discretises and solves.
+    ///
+    /// # Errors
+    /// Settings that do not fit the specimen. Not converging is no error: the solution says so.
+    fn solve(
+        &self,
+        prepared: Prepared,
+        params: &SolveParams,
+        observe: &mut Observe,
+    ) -> Result<JobResult>;
 }
 
-/// What a solve came to.
+/// The result of a solve.
 #[allow(clippy::large_enum_variant)] // one value a solve, moved once
 pub enum JobResult {
     /// Of one load.
@@ -36,41 +53,17 @@ pub enum JobResult {
     Stiffness(Stiffness),
 }
 
+impl Deref for Job {
+    type Target = dyn Solve;
+
+    fn deref(&self) -> &Self::Target {
+        &*self.0
+    }
+}
+
 impl Job {
-    pub fn of<D: Discretisation>(case: D::Case) -> Job {
-        Job {
-            label: Box::new(move |specimen, params, key| D::label(&case, specimen, params, key)),
-            cost: Box::new(move |params, known| D::cost(&case, params, known)),
-            solve: Box::new(move |prepared, params, observe| {
-                solve::<D>(&case, prepared, params, observe)
-            }),
-        }
-    }
-
-    /// Fills in the settings of a row that say how the specimen is discretised.
-    pub fn label(&self, specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings {
-        (self.label)(specimen, params, key)
-    }
-
-    /// What the solve takes.
-    ///
-    /// # Errors
-    /// Settings that do not fit the specimen.
-    pub fn cost(&self, params: &SolveParams, known: Known) -> Result<Cost> {
-        (self.cost)(params, known)
-    }
-
-    /// Discretises and solves.
-    ///
-    /// # Errors
-    /// Settings that do not fit the specimen. Not converging is no error: the solution says so.
-    pub fn solve(
-        &self,
-        prepared: Prepared,
-        params: &SolveParams,
-        observe: &mut Observe,
-    ) -> Result<JobResult> {
-        (self.solve)(prepared, params, observe)
+    pub fn of<D: Discretisation + 'static>(case: D::Case) -> Job {
+        Job(Box::new(Of::<D>(case)))
     }
 
     /// The same from the specimen alone, for a single solve.
@@ -106,40 +99,62 @@ impl JobResult {
     }
 }
 
-fn solve<D: Discretisation>(
-    case: &D::Case,
-    prepared: Prepared,
-    params: &SolveParams,
-    observe: &mut Observe,
-) -> Result<JobResult> {
-    if params.load == Load::Stiffness {
-        let solved = stiffness::<D>(case, prepared, params, observe)?;
-        return Ok(JobResult::Stiffness(solved));
+/// A solve by one kind of discretisation.
+struct Of<D: Discretisation>(D::Case);
+
+impl<D: Discretisation> Solve for Of<D> {
+    fn label(&self, specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings {
+        D::label(&self.0, specimen, params, key)
     }
-    let model = D::build(case, prepared, params)?;
-    let system = model.system(LoadSet::Compression);
-    if system.sites == 0 {
-        let solved = Solved::disconnected(system.dropped);
-        return Ok(JobResult::Modulus(solved, Recorded::default()));
+
+    fn cost(&self, params: &SolveParams, known: Known) -> Result<Cost> {
+        D::cost(&self.0, params, known)
     }
-    let mechanisms = count_mechanisms(&system)?;
-    let loads = LoadSet::Compression.numbers();
-    let (_, u, info) = equilibrium(&system, loads, params, observe)
-        .next()
-        .expect("a compression is one load");
-    let moduli = model.assess(&u, &info);
-    let recorded = model.fields(prepared, params, &u, &moduli)?;
-    let solved = Solved {
-        sites: system.sites,
-        dropped: system.dropped,
-        unknowns: system.held.free::<3>(),
-        iterations: info.iterations,
-        residual: info.residual,
-        ended: info.ended,
-        moduli,
-        mechanisms,
-    };
-    Ok(JobResult::Modulus(solved, recorded))
+
+    fn solve(
+        &self,
+        prepared: Prepared,
+        params: &SolveParams,
+        observe: &mut Observe,
+    ) -> Result<JobResult> {
+        if params.load == Load::Stiffness {
+            let solved = stiffness::<D>(&self.0, prepared, params, observe)?;
+            return Ok(JobResult::Stiffness(solved));
+        }
+        let model = D::build(&self.0, prepared, params)?;
+        let system = model.system(LoadSet::Compression);
+        if system.sites == 0 {
+            let no_answer = bone_connects(prepared.specimen, params);
+            let solved = Solved::disconnected(system.dropped, no_answer);
+            return Ok(JobResult::Modulus(solved, Recorded::default()));
+        }
+        let mechanisms = count_mechanisms(&system)?;
+        let loads = LoadSet::Compression.numbers();
+        let (_, u, info) = equilibrium(&system, loads, params, observe)
+            .next()
+            .expect("a compression is one load");
+        let moduli = model.assess(&u, &info);
+        let recorded = model.fields(prepared, params, &u, &moduli)?;
+        let solved = Solved {
+            sites: system.sites,
+            dropped: system.dropped,
+            unknowns: system.held.free::<3>(),
+            iterations: info.iterations,
+            residual: info.residual,
+            ended: info.ended,
+            moduli,
+            mechanisms,
+            no_answer: moduli.e_app_mpa == 0.0,
+        };
+        Ok(JobResult::Modulus(solved, recorded))
+    }
+}
+
+/// Whether voxels of bone that share nodes join the grips. A grip that no voxel plane fits joins nothing.
+pub fn bone_connects(specimen: &Specimen, params: &SolveParams) -> bool {
+    let bone = &specimen.bone;
+    let grips = Planes::within(&bone.grid, params.axis, params.grip_mm);
+    grips.is_ok_and(|grips| voxels::connects(bone.grid, bone.as_slice(), |b| *b != 0, grips))
 }
 
 fn count_mechanisms<O: MixedPrecision, C: Coarsen, G: Functional<3>>(

@@ -1,4 +1,4 @@
-//! Owns the settings of a solve: material, load, supports, accuracy, and what is wanted beside the modulus.
+//! Owns the settings of a solve: material, load, supports, accuracy, and what is wanted besides the modulus.
 
 use crate::error::{Error, Result};
 use crate::grid::Axis;
@@ -88,7 +88,7 @@ impl Default for SolveParams {
 }
 
 impl SolveParams {
-    /// Whether grey values of the scan are needed beside its mask.
+    /// Whether grey values of the scan are needed in addition to its mask.
     pub fn needs_grey(&self) -> bool {
         self.material.is_some()
             || self.smoothed_again

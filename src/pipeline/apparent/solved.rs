@@ -1,6 +1,7 @@
 //! Owns what a solve yields, and its row of the results table.
 
-use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::params::{Load, Method, SolveParams};
+use crate::result::notes;
 use crate::result::row::{Marks, Row, Solution};
 use crate::result::settings::{Settings, Supports};
 use crate::solver::cg::Ended;
@@ -31,11 +32,13 @@ pub struct Solved {
     pub moduli: Moduli,
     /// Only where the settings ask for a count.
     pub mechanisms: Option<usize>,
+    /// True where the modulus is 0 although the bone connects the loaded faces: the model does not, or counts none of its sites.
+    pub no_answer: bool,
 }
 
 impl Solved {
-    /// The result of a structure that does not connect the faces.
-    pub fn disconnected(dropped: usize) -> Self {
+    /// The result of a model that does not connect the faces; `no_answer` where the bone does.
+    pub fn disconnected(dropped: usize, no_answer: bool) -> Self {
         let zero = Moduli {
             e_app_mpa: 0.0,
             from_energy_mpa: 0.0,
@@ -52,10 +55,11 @@ impl Solved {
             ended: Ended::ResidualTolerance,
             moduli: zero,
             mechanisms: None,
+            no_answer,
         }
     }
 
-    /// Whether bone connects the loaded faces.
+    /// Whether the model connects the loaded faces.
     pub fn connected(&self) -> bool {
         self.sites > 0
     }
@@ -98,7 +102,8 @@ impl Solved {
             iterations: count(self.iterations),
             residual: Some(self.residual),
             converged: Some(self.ended.converged()),
-            e_app_mpa: Some(m.e_app_mpa),
+            // Of no sites the stress is a sum of nothing, which is -0.
+            e_app_mpa: Some(m.e_app_mpa + 0.0),
             e_app_reaction_mpa: Some(m.from_reaction_mpa),
             e_app_stress_mpa: Some(m.from_stress_mpa),
             algebraic_error_mpa: Some(m.algebraic_error_mpa).filter(|e| e.is_finite()),
@@ -108,16 +113,32 @@ impl Solved {
         Row {
             solved: Some(solution),
             marks: Marks {
-                note: self.note(),
+                note: self.note(blank.key.method),
                 ..blank.marks
             },
             ..blank
         }
     }
 
+    /// What a model lacks that carries no load although the bone does.
+    fn lost(&self, method: Method) -> &'static str {
+        match (self.connected(), method) {
+            (true, _) => {
+                "no site of this lattice has all its bonds, and firm counts such sites only"
+            }
+            (false, Method::Lattice) => {
+                "this lattice is disconnected although the bone connects the loaded faces"
+            }
+            (false, _) => {
+                "elements of this size are disconnected although the bone connects the loaded faces"
+            }
+        }
+    }
+
     /// What a reader must know of this row, in words.
-    fn note(&self) -> Option<String> {
+    fn note(&self, method: Method) -> Option<String> {
         match self.ended {
+            _ if self.no_answer => Some(format!("{}: {}", self.lost(method), notes::NO_ANSWER)),
             _ if !self.connected() => {
                 Some("no path of bone between the loaded faces: E_app is 0".into())
             }

@@ -295,7 +295,7 @@ fn level_for(counts: &[u64], voxels: u64) -> usize {
     reached.unwrap_or(BINS - 1)
 }
 
-/// Bone up to a level of the holes, its largest piece kept; slices are made anew, never held. Returns bone voxels kept
+/// Bone up to a level of the holes, its largest piece kept; slices are generated again for each pass, never kept. Returns bone voxels kept
 /// and removed. A gap leaves two halves, and both belong.
 fn carve(
     shape: &Shape,

@@ -14,8 +14,8 @@ pub struct Agreement {
     /// Limits of agreement: bias ∓ 1.96 sd.
     pub lower_limit: f64,
     pub upper_limit: f64,
-    /// Two-sided paired t test of bias 0.
-    pub bias_p: f64,
+    /// Two-sided paired t test of bias 0; None where the differences do not vary, so that there is nothing to test by.
+    pub bias_p: Option<f64>,
 }
 
 /// None for fewer than two pairs.
@@ -33,7 +33,7 @@ pub fn agreement(a: &[f64], b: &[f64]) -> Option<Agreement> {
         sd,
         lower_limit: bias - 1.96 * sd,
         upper_limit: bias + 1.96 * sd,
-        bias_p: two_sided(bias / (sd / (n as f64).sqrt()), (n - 1) as f64),
+        bias_p: (sd > 0.0).then(|| two_sided(bias / (sd / (n as f64).sqrt()), (n - 1) as f64)),
     })
 }
 
@@ -56,7 +56,13 @@ mod tests {
         close(found.sd, BA_SD);
         close(found.lower_limit, BA_LOWER);
         close(found.upper_limit, BA_UPPER);
-        close(found.bias_p, BA_P);
+        close(found.bias_p.unwrap(), BA_P);
         assert_eq!(agreement(&A[..1], &B[..1]), None);
+    }
+
+    #[test]
+    fn methods_that_do_not_differ_have_no_p() {
+        let same = agreement(&A, &A).unwrap();
+        assert_eq!((same.bias, same.sd, same.bias_p), (0.0, 0.0, None));
     }
 }

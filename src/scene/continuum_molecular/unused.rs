@@ -1,4 +1,4 @@
-//! Owns the refusal of what a scene names beside its problem, but its solution would not use.
+//! Owns the refusal of what a scene names in addition to its problem, but its solution would not use.
 
 use super::sweep::Parameter;
 use super::{Known, KnownField, Molecular, Problem};

@@ -72,14 +72,15 @@ fn lowest(name: &str, k: &[f64], setup: &Setup, advice: &str) -> Option<String> 
 /// The error of a factorisation, with `warnings` as what may be behind it.
 pub fn with_warnings(error: Error, warnings: &[String]) -> Error {
     match error {
-        Error::Specimen { found, advice }
-            if !warnings.is_empty() && found.contains("not positive definite") =>
-        {
-            Error::Specimen {
-                found: format!("{found}; {}", warnings.join("; ")),
-                advice: format!("change the material or its exponents, or {advice}"),
-            }
-        }
+        Error::Specimen {
+            found,
+            advice,
+            source,
+        } if !warnings.is_empty() && found.contains("not positive definite") => Error::Specimen {
+            found: format!("{found}; {}", warnings.join("; ")),
+            advice: format!("change the material or its exponents, or {advice}"),
+            source,
+        },
         other => other,
     }
 }

@@ -16,7 +16,7 @@ use lost::{add_forces, entries};
 
 const OUTSIDE: u32 = u32::MAX;
 
-/// What breaking bonds came to, per unit of load squared and thickness.
+/// What breaking bonds changed, per unit of load squared and thickness.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cut {
     pub iterations: usize,

@@ -80,7 +80,7 @@ struct Peridynamic {
     q: Vec<f64>,
     rate: Option<Vec<f64>>,
     /// Whether a step has been taken: before, supports are where the body is.
-    begun: bool,
+    started: bool,
     values: Vec<f64>,
     /// Of the solver's factor.
     factor_origin: Option<FactorOrigin>,
@@ -148,7 +148,7 @@ impl Peridynamic {
             reference: params.density.reference,
             q,
             rate: None,
-            begun: false,
+            started: false,
             values,
             factor_origin: None,
         })
@@ -167,7 +167,7 @@ impl Peridynamic {
 impl Marching for Peridynamic {
     fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged> {
         let given = self.body.given(now);
-        let held = match self.begun {
+        let held = match self.started {
             true => self.body.given(before),
             false => self.body.at_rest(),
         };
@@ -187,7 +187,7 @@ impl Marching for Peridynamic {
         };
         let mut q = self.q.clone();
         let moved = given != held;
-        let from = self.begun.then_some(before);
+        let from = self.started.then_some(before);
         if moved && !self.body.stretch(&mut q, from, now) {
             let (from, to) = (step(&held), step(&nudged));
             if self.solver.predict(&from, &to, NUDGE, &mut q)? {
@@ -206,7 +206,7 @@ impl Marching for Peridynamic {
         }
         // What a change of the supports moved does not go on.
         self.rate = (!moved).then(|| rate_of(&self.q, &q, now - before));
-        self.begun = true;
+        self.started = true;
         self.q = q;
         self.body.map.expand(&self.q, &given, &mut self.values);
         Ok(advance)
@@ -242,7 +242,7 @@ impl Marching for Peridynamic {
         let n = self.q.len();
         self.q = state.array("q", n)?.to_vec();
         self.values = state.array("values", self.values.len())?.to_vec();
-        self.begun = true;
+        self.started = true;
         self.rate = state.find("rate").map(<[f64]>::to_vec);
         self.factor_origin = FactorOrigin::restore(state, self.values.len())?;
         let Some(factor_origin) = &self.factor_origin else {

@@ -53,7 +53,7 @@ struct Local {
     q: Vec<f64>,
     rate: Option<Vec<f64>>,
     /// Whether a step has been taken: before, supports are where the body is.
-    begun: bool,
+    started: bool,
     values: Vec<f64>,
     old: Old,
     /// Of the solver's factor.
@@ -121,7 +121,7 @@ impl Local {
             loads,
             q,
             rate: None,
-            begun: false,
+            started: false,
             values,
             old,
             factor_origin: None,
@@ -164,12 +164,12 @@ fn require_elements(model: &Continuum) -> Result<()> {
 impl Marching for Local {
     fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged> {
         let given = self.body.given(now);
-        let held = match self.begun {
+        let held = match self.started {
             true => self.body.given(before),
             false => self.body.at_rest(),
         };
         let load = self.loads.at(now, given.len());
-        let loads_move = !self.begun || load != self.loads.at(before, given.len());
+        let loads_move = !self.started || load != self.loads.at(before, given.len());
         let nudged = nudge(&held, &given);
         let factor_origin = |given: &[f64]| FactorOrigin {
             given: given.to_vec(),
@@ -205,7 +205,7 @@ impl Marching for Local {
         }
         // What a change of supports or loads moved does not go on.
         self.rate = steady.then(|| rate_of(&self.q, &q, now - before));
-        self.begun = true;
+        self.started = true;
         self.q = q;
         self.body.map.expand(&self.q, &given, &mut self.values);
         self.old = match &self.old {
@@ -254,7 +254,7 @@ impl Marching for Local {
         self.q = state.array("q", n)?.to_vec();
         self.values = state.array("values", self.values.len())?.to_vec();
         self.old = self.old.like(state.array("old", self.old.flat().len())?);
-        self.begun = true;
+        self.started = true;
         self.rate = state.find("rate").map(<[f64]>::to_vec);
         self.factor_origin = FactorOrigin::restore(state, self.values.len())?;
         let Some(factor_origin) = &self.factor_origin else {

@@ -206,20 +206,22 @@ pub fn run_time_loop(
             Err(why) if length > clock.whole => {
                 step_size.failed();
                 progress.step_statistics.halved();
+                let why = in_words(why);
                 observer.say(&format!("t = {now:.6}: {why}; a shorter step is tried"));
             }
             Err(why) if progress.level < clock.finest => {
                 progress.level += 1;
                 progress.streak = 0;
                 progress.step_statistics.halved();
-                let length = clock.length(progress.level);
+                let (why, length) = (in_words(why), clock.length(progress.level));
                 observer.say(&format!("t = {now:.6}: {why}; step halved to {length:.3e}"));
             }
             Err(why) => {
                 observer.again(&model.frame(before, true))?;
                 summary.stopped = Some(format!(
-                    "at t = {before:.6} no step down to {:.3e} converged: {why}; the last good state is written",
-                    now - before
+                    "at t = {before:.6} no step down to {:.3e} converged: {}; the last good state is written",
+                    now - before,
+                    in_words(why)
                 ));
                 break;
             }
@@ -227,6 +229,18 @@ pub fn run_time_loop(
     }
     progress.report(summary);
     Ok(())
+}
+
+/// Why a step failed, and what a user can do.
+fn in_words(why: NotConverged) -> String {
+    match why {
+        NotConverged::Inadmissible => {
+            "a density would go negative or an element turn inside out: bone is resorbed faster than its load sustains (set \
+             growth.least, raise the load, lower growth.stimulus, or end sooner), or the load changes too much at once"
+                .to_owned()
+        }
+        other => other.to_string(),
+    }
 }
 
 /// Doubles a halved step that has done well, where the longer one ends on the planned steps.

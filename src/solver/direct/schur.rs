@@ -12,7 +12,7 @@ pub struct SchurComplement {
     factor: Mat<f64>,
 }
 
-/// What a zone's solve came to.
+/// The result of a zone's solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZoneInfo {
     pub iterations: usize,
@@ -50,7 +50,7 @@ impl SchurComplement {
         tolerance: f64,
     ) -> ZoneInfo {
         let n = b.len();
-        // S d is kept beside each vector: S⁻¹ is at hand, S is not.
+        // S d is kept with each vector: S⁻¹ is at hand, S is not.
         let mut sd = self.multiply(d);
         let mut r: Vec<f64> = b.iter().zip(&sd).map(|(b, s)| b - s).collect();
         change(d, &mut r);

@@ -9,7 +9,7 @@ pub struct Stretches {
     pub at: Vec<u32>,
 }
 
-/// Writes the sites' words. `ends(i, row)` tells the bonds' ends of site `i`.
+/// Writes the sites' words. `ends(i, row)` fills in the bonds' ends of site `i`.
 pub fn encode(
     sites: usize,
     chains: &Chains,

@@ -7,6 +7,7 @@ pub mod supports;
 
 use crate::discretisation::voxels::Planes;
 use crate::error::Result;
+use crate::mask::resample;
 use crate::measure::apparent::Loaded;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision, Operator};
@@ -65,9 +66,9 @@ impl Discretisation for VoxelModel {
     /// Size and tissue of the elements stand in the settings of the solve.
     type Case = ();
 
-    /// The size of the elements: the mean edge where edges differ.
+    /// The size of the elements: the mean edge where edges differ. Blocks of voxels that do not fill a side are shortened to it.
     fn label(_: &(), specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings {
-        let [x, y, z] = specimen.bone.grid.spacing_mm;
+        let [x, y, z] = resample::block_edges_mm(specimen.bone.grid, params.coarsen);
         let edge = if x == y && y == z {
             x
         } else {
@@ -77,7 +78,7 @@ impl Discretisation for VoxelModel {
             method: Method::VoxelFe,
             structure: CellType::Hex8,
             boundary: None,
-            lp_mm: edge * params.coarsen as f64 / params.refine as f64,
+            lp_mm: edge / params.refine as f64,
             elements: Some(resolution::elements(specimen, params)),
             registration_mm: None,
             ..key

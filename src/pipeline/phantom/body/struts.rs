@@ -21,7 +21,7 @@ pub struct Struts {
     /// Width over which two struts' surfaces flow into one another.
     fillet_mm: f64,
     gap_mm: f64,
-    /// Nothing farther than this from a surface is told apart.
+    /// Distances from a surface beyond this are not resolved.
     reach_mm: f64,
     low: Vec3,
     bin_mm: f64,

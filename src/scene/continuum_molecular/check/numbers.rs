@@ -29,8 +29,9 @@ pub fn check(scene: &Setting, model: &Molecular) -> Result<()> {
 }
 
 fn table(settings: &impl Serialize) -> Result<Value> {
-    Value::try_from(settings)
-        .map_err(|e| Error::specimen(format!("the scene has no table: {e}"), "correct it"))
+    Value::try_from(settings).map_err(|e| {
+        Error::specimen(format!("the scene has no table: {e}"), "correct it").caused_by(e)
+    })
 }
 
 /// Goes through a table; `region` says whether infinities will do.

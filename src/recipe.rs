@@ -43,7 +43,7 @@ pub fn built_in(name: &str) -> Result<&'static str> {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Recipe {
-    /// Stated error asked for, algebraic and discretisation (0.03 is 3 %). Method and resolution then follow from it, and
+    /// Stated error asked for: solver, elements and shape (0.03 is 3 %). The resolution then follows from it, and
     /// what `[lattice]` says is not used.
     #[serde(deserialize_with = "percent::optional")]
     pub error: Option<f64>,
@@ -54,12 +54,12 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// Reads a recipe file, or, where there is none of this name, the recipe in the program.
+    /// Reads a recipe file, or, where there is no file of this name, the recipe in the program.
     ///
     /// # Errors
     /// No such recipe, a scan in its place, unknown keys, unusable values.
     pub fn read(path: &Path) -> Result<Recipe> {
-        let name = path.to_str().filter(|_| !path.exists());
+        let name = path.to_str().filter(|_| !path.is_file());
         if let Some(text) = name.and_then(|name| built_in(name).ok()) {
             return Recipe::parse(text, path);
         }

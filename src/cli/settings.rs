@@ -14,8 +14,8 @@ pub struct TissueSettings {
     #[arg(long, value_name = "E", value_parser = words::positive)]
     young_mpa: Option<f64>,
     /// Moduli that differ from voxel to voxel: labels:100=6829/0.3,127=10000 (E, and ν if another), power:C,N (E = C·ρ^N),
-    /// linear:A,B (E = A·ρ + B), homminga:FULL[,N] (E = young-mpa·(ρ/FULL)^N, N 1.7); ρ are the scan's values. Needs
-    /// `segment --keep-grey` or `--labels`
+    /// linear:A,B (E = A·ρ + B), homminga:FULL[,N] (E = young-mpa·(ρ/FULL)^N, N 1.7); ρ are the scan's values, which
+    /// `segment` keeps
     #[arg(long, value_name = "LAW", value_parser = words::material)]
     material: Option<Law>,
     /// Density of the law is SLOPE·value + INTERCEPT [default: the scan's values]

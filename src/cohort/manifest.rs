@@ -21,8 +21,16 @@ const COLUMNS: [&str; 9] = [
     "gaussian_voxels",
 ];
 
+/// What a manifest lists.
+#[derive(Debug)]
+pub struct Manifest {
+    pub jobs: Vec<ScanJob>,
+    /// Columns that mean nothing here, age and the like.
+    pub unused: Vec<String>,
+}
+
 /// The scans of a manifest. Paths are relative to its folder.
-pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
+pub fn read(path: &Path, params: &SegmentParams) -> Result<Manifest> {
     let wrong = |found: String| {
         Error::file(
             path,
@@ -59,7 +67,7 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
         .map_err(|e| wrong(format!("cannot be read: {e}")))?
         .clone();
     let header = without_empty_end(&header);
-    check_header(&header).map_err(wrong)?;
+    let unused = unused_columns(&header).map_err(wrong)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut jobs = Vec::new();
     for record in reader.records() {
@@ -91,7 +99,7 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Vec<ScanJob>> {
     if jobs.is_empty() {
         return Err(wrong("lists no scans".to_owned()));
     }
-    Ok(jobs)
+    Ok(Manifest { jobs, unused })
 }
 
 /// A setting that cannot be used, with the line of the manifest that gives it.
@@ -141,7 +149,9 @@ fn delimiter(text: &[u8]) -> u8 {
     }
 }
 
-fn check_header(header: &csv::StringRecord) -> std::result::Result<(), String> {
+/// Columns that are none of [`COLUMNS`]. One that is spelt nearly like them is refused.
+fn unused_columns(header: &csv::StringRecord) -> std::result::Result<Vec<String>, String> {
+    let mut unused = Vec::new();
     for name in header {
         if !COLUMNS.contains(&name) {
             let nearest = COLUMNS.iter().max_by(|a, b| {
@@ -149,12 +159,16 @@ fn check_header(header: &csv::StringRecord) -> std::result::Result<(), String> {
             });
             // Words that are not alike are no help.
             let alike = nearest.filter(|best| strsim::jaro_winkler(name, best) > 0.75);
-            let advice = alike.map_or(String::new(), |best| format!("; did you mean `{best}`?"));
-            return Err(format!("unknown column `{name}`{advice}"));
+            match alike {
+                Some(best) => {
+                    return Err(format!("unknown column `{name}`; did you mean `{best}`?"));
+                }
+                None => unused.push(name.to_owned()),
+            }
         }
     }
     match header.iter().any(|name| name == "path") {
-        true => Ok(()),
+        true => Ok(unused),
         false => Err("has no column `path`".to_owned()),
     }
 }
@@ -257,7 +271,7 @@ mod tests {
             upper: Some(2000.0),
             ..SegmentParams::default()
         };
-        let jobs = read(&path, &params)?;
+        let jobs = read(&path, &params)?.jobs;
         assert!(jobs[0].input.starts_with(dir.path()));
         Ok(jobs)
     }
@@ -381,6 +395,16 @@ mod tests {
             words.contains("line 3") && words.contains("save it as UTF-8"),
             "{words}"
         );
+    }
+
+    #[test]
+    fn columns_that_mean_nothing_here_are_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cohort.csv");
+        std::fs::write(&path, "path,age,sex,group\na.nii,71,f,OA\n").unwrap();
+        let manifest = read(&path, &SegmentParams::default()).unwrap();
+        assert_eq!(manifest.unused, ["age", "sex"]);
+        assert_eq!(manifest.jobs[0].group.as_deref(), Some("OA"));
     }
 
     #[test]

@@ -22,6 +22,7 @@ use crate::record::failures;
 use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::results::Results;
+use crate::result::answer::ScanFacts;
 use crate::result::row::Row;
 use indicatif::ProgressBar;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -237,7 +238,13 @@ impl Run<'_> {
             .iter()
             .zip(estimates)
             .zip(done.drain(..))
-            .map(|((job, estimate), solved)| result(job, *estimate, solved, self.recipe.error))
+            .map(|((job, estimate), solved)| {
+                let facts = ScanFacts {
+                    target: self.recipe.error,
+                    ..answer::facts(&self.out.join(&job.name))
+                };
+                result(job, *estimate, solved, &facts)
+            })
             .collect();
         self.say_what_fell_short(&results);
         Ok((outcome(&results), results))

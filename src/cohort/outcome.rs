@@ -57,8 +57,12 @@ pub(super) fn in_words(rows: &[Row]) -> String {
         n => format!(", {n} not converged"),
     };
     let answer = best(rows).map(|row| answer_in_words(&line(row, &ScanFacts::default())));
+    let plural = match rows.len() {
+        1 => "",
+        _ => "s",
+    };
     format!(
-        "{}; {} rows{stalled}",
+        "{}; {} row{plural}{stalled}",
         answer.unwrap_or("no modulus".to_owned()),
         rows.len()
     )
@@ -78,25 +82,21 @@ pub(super) fn said_of_kept(rows: &[Row], before: &[Row]) -> &'static str {
     }
 }
 
-/// `target`: the stated error asked for, if any.
+/// `facts` are what the scan's folder says; their target is the stated error asked for, if any.
 pub(super) fn result(
     job: &ScanJob,
     estimate: Estimate,
     solved: Option<Result<Vec<Row>>>,
-    target: Option<f64>,
+    facts: &ScanFacts,
 ) -> ScanResult {
     let missed = |rows: &[Row]| {
         let broken = rows.iter().all(Row::is_disconnected);
-        target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
+        facts
+            .target
+            .is_some_and(|target| !broken && !adaptive::meets(rows, target))
     };
     let answer = match &solved {
-        Some(Ok(rows)) => best(rows).map(|row| {
-            let facts = ScanFacts {
-                target,
-                ..ScanFacts::default()
-            };
-            line(row, &facts)
-        }),
+        Some(Ok(rows)) => best(rows).map(|row| line(row, facts)),
         _ => None,
     };
     let (state, error, rows) = match solved {

@@ -7,6 +7,7 @@ use crate::command::segment;
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
+use crate::result::answer::ScanFacts;
 use std::path::Path;
 
 /// What would run. Every scan is read and segmented, so what its solves need is known.
@@ -40,11 +41,11 @@ pub(super) fn plan(
             Ok(e) => {
                 let (to, from) = (to.display(), job.input.display());
                 session.result(format!("{to} <- {from}: {e}"));
-                result(job, estimate, None, None)
+                result(job, estimate, None, &ScanFacts::default())
             }
             Err(e) => {
                 session.warn(format!("{} would fail: {e}", job.name));
-                result(job, estimate, Some(Err(e.clone())), None)
+                result(job, estimate, Some(Err(e.clone())), &ScanFacts::default())
             }
         });
         if let Some(free) = host::available_mib().filter(|free| *free < estimate.memory_mib) {

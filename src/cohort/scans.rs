@@ -34,7 +34,15 @@ pub fn find(
     let mut jobs = Vec::new();
     for input in inputs {
         if is_manifest(input) {
-            jobs.extend(manifest::read(input, params)?);
+            let manifest = manifest::read(input, params)?;
+            if !manifest.unused.is_empty() {
+                session.warn(format!(
+                    "{}: columns that are not used: {}",
+                    input.display(),
+                    manifest.unused.join(", ")
+                ));
+            }
+            jobs.extend(manifest.jobs);
             continue;
         }
         let found = scans_under(input, selection, session)?;
@@ -147,6 +155,13 @@ fn scans_under(
         });
     }
     if found.is_empty() {
+        if input.join("segment.json").is_file() || input.join("answers.csv").is_file() {
+            return Err(Error::file(
+                input,
+                "is a folder of results, where scans were expected",
+                "give the scans; `bonepd-ct report` and `bonepd-ct solve` read folders of results",
+            ));
+        }
         let wanted = selection
             .pattern
             .as_ref()
@@ -271,7 +286,7 @@ fn refuse_doubles(jobs: &[ScanJob]) -> Result<()> {
                     other.input.display(),
                     job.input.display()
                 ),
-                "rename one, or list them in a manifest (CSV) with a column `name`",
+                "rename one, or give each a name of its own in the column `name` of a manifest (CSV)",
             ));
         }
     }

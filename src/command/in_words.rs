@@ -59,6 +59,9 @@ fn note(row: &Row) -> String {
 /// The answer of a scan in a few words.
 pub fn answer_in_words(answer: &AnswerLine) -> String {
     let e_app = answer.e_app_mpa.unwrap_or(f64::NAN);
+    if e_app == 0.0 {
+        return format!("carries no load: E_app 0 by {}", answer.method);
+    }
     let error = match (answer.error_mpa, answer.error_percent) {
         (Some(e), Some(p)) => format!(" ± {e:.3} MPa ({p:.1} %)"),
         _ => " MPa (error not stated)".to_owned(),

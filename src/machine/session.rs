@@ -74,12 +74,12 @@ impl Session {
         };
         let warned = warned.lock().expect("no one panics while adding a line");
         for Alike { first, scans } in warned.groups() {
-            if let [_, others @ ..] = &scans[..]
+            if let [of, others @ ..] = &scans[..]
                 && !others.is_empty()
             {
                 let names = shortened(others);
                 self.put(&format!(
-                    "warning: the same of {} more scans ({names}): {first}",
+                    "warning: the same of {} more scans ({names}): {first} (numbers of {of})",
                     others.len()
                 ));
             }

@@ -14,6 +14,9 @@ pub const ANSWER: &str = "answer.json";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     pub scan: String,
+    pub subject: Option<String>,
+    pub group: Option<String>,
+    pub bv_tv: f64,
     pub e_app_mpa: Option<f64>,
     pub error_mpa: Option<f64>,
     /// Relative error asked for.
@@ -21,12 +24,17 @@ pub struct Answer {
     pub met: Option<bool>,
     pub method: String,
     pub element_mm: f64,
+    pub young_mpa: f64,
+    pub poisson: f64,
     /// Load, ends and tissue in words.
     pub conditions: String,
     /// Relative change of E_app per relative change of BV.
     pub threshold_sensitivity: Option<f64>,
     pub stiffness_n_per_mm: Option<f64>,
     pub force_n: Option<f64>,
+    pub failure_load_n: Option<f64>,
+    /// What a reader must know of the number.
+    pub note: Option<String>,
     /// Of all rows of the condition together.
     pub wall_s: Option<f64>,
 }
@@ -43,16 +51,24 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
             .iter()
             .filter(|row| Condition::of(&row.key) == condition)
     };
+    let failure = own().filter_map(|row| row.solved.as_ref()?.failure).last();
     let AnswerLine {
         scan,
+        subject,
+        group,
+        bv_tv,
         e_app_mpa,
         error_mpa,
         met,
         method,
         element_mm,
+        young_mpa,
+        poisson,
         threshold_sensitivity,
         stiffness_n_per_mm,
         force_n,
+        failure_load_n,
+        note,
         ..
     } = line(best(own().copied())?, facts);
     let wall_s = own()
@@ -60,12 +76,17 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         .filter_map(|row| row.wall_s());
     Some(Answer {
         scan,
+        subject,
+        group,
+        bv_tv,
         e_app_mpa,
         error_mpa,
         target: facts.target,
         met,
         method,
         element_mm,
+        young_mpa,
+        poisson,
         conditions: format!(
             "{} {}",
             condition.load_in_words(),
@@ -74,6 +95,8 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         threshold_sensitivity,
         stiffness_n_per_mm,
         force_n,
+        failure_load_n: failure_load_n.or(failure.map(|f| f.load_n)),
+        note,
         wall_s: Some(wall_s.sum()),
     })
 }

@@ -94,7 +94,7 @@ const ANSWERS: [Column; 22] = [
     column(
         "error_mpa",
         "MPa",
-        "everything that is stated: algebraic and discretisation error together; NA where the method states none",
+        "everything that is stated: algebraic, discretisation and shape error together; NA where the method states none",
     ),
     column("error_percent", "%", "error_mpa over e_app_mpa"),
     column(
@@ -128,7 +128,7 @@ const ANSWERS: [Column; 22] = [
     column(
         "yield_stress_mpa",
         "MPa",
-        "apparent yield stress of a nonlinear solve",
+        "apparent yield stress; NA until there are nonlinear solves",
     ),
     column(
         "threshold_sensitivity",

@@ -51,11 +51,9 @@ fn by_group(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
         return None;
     }
     let points = groups.iter().enumerate().map(|(hue, group)| {
-        let own = of(kept, Some(group));
-        let values: Vec<f64> = own.iter().filter_map(|a| a.e_app_mpa).collect();
-        let n = distinct(own.iter().map(|a| a.subject.as_deref().unwrap_or(&a.scan))).len();
+        let values = of_subjects(&of(kept, Some(group)));
         GroupOfPoints {
-            label: format!("{group} (n = {n})"),
+            label: format!("{group} (n = {})", values.len()),
             hue,
             mean: summary(&values).map(|s| {
                 [
@@ -72,12 +70,24 @@ fn by_group(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
         stem: "groups".to_owned(),
         title: "Apparent modulus by group".to_owned(),
         caption: format!(
-            "Points: scans; line: median; diamond with bar: mean and its 95 % interval over scans (the table has it over subjects).{caption}"
+            "Points: subjects, the mean of their scans; line: median; diamond with bar: mean and its 95 % interval.{caption}"
         ),
         y: Axis::linear("apparent modulus (MPa)"),
         content: Content::Groups(points.collect()),
         ..Figure::default()
     })
+}
+
+/// The modulus of each subject, the mean of its scans.
+fn of_subjects(own: &[&AnswerLine]) -> Vec<f64> {
+    let subject = |a: &AnswerLine| a.subject.clone().unwrap_or_else(|| a.scan.clone());
+    let subjects = distinct(own.iter().map(|a| subject(a)));
+    let mean = |name: String| {
+        let of_one = own.iter().filter(|a| subject(a) == name);
+        let moduli: Vec<f64> = of_one.filter_map(|a| a.e_app_mpa).collect();
+        summary(&moduli).map(|s| s.mean)
+    };
+    subjects.into_iter().filter_map(mean).collect()
 }
 
 /// None for fewer than two scans.

@@ -189,6 +189,23 @@ pub fn comparable(answers: &Answers) -> (Vec<&AnswerLine>, Vec<String>) {
     (kept, notes)
 }
 
+/// Says so where answers that are compared were found in different ways: their errors differ.
+pub fn unlike_methods(kept: &[&AnswerLine]) -> Option<String> {
+    let methods = distinct(kept.iter().map(|line| line.method.as_str()));
+    let of = |method: &str| {
+        let scans = kept.iter().filter(|line| line.method == method);
+        let scans: Vec<&str> = scans.map(|line| line.scan.as_str()).collect();
+        format!("{}: {}", method_words(method), scans.join(", "))
+    };
+    (methods.len() > 1).then(|| {
+        let lists: Vec<String> = methods.iter().map(|method| of(method)).collect();
+        format!(
+            "the answers were found in different ways ({}): their errors differ, solve all scans in one way before groups are compared",
+            lists.join("; ")
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

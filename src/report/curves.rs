@@ -93,8 +93,13 @@ fn curves<'a>(
 /// E_app against lattice parameter, a figure per scan. Extrapolated values are level lines.
 pub fn convergence(rows: &[Row]) -> Vec<Figure> {
     let solved = solved(rows);
+    let sizes = |scan: &str| {
+        let own = solved.iter().filter(|s| s.row.key.scan == scan);
+        distinct(own.map(|s| s.row.key.lp_mm.to_bits())).len()
+    };
     distinct(solved.iter().map(|s| &s.row.key.scan))
         .into_iter()
+        .filter(|scan| sizes(scan) > 1)
         .map(|scan| convergence_of(scan, &solved))
         .collect()
 }

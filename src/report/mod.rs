@@ -77,6 +77,7 @@ pub fn report(rows: &[Row], answers: Answers, params: &ReportParams) -> Report {
     notes.extend(answers.left_out.iter().cloned());
     notes.extend(no_load);
     notes.extend(groups.notes.iter().cloned());
+    notes.extend(answers::unlike_methods(&kept));
     let mut method_notes = row_notes(rows);
     method_notes.extend(left_out);
     method_notes.extend(statistics.analysis_of_variance());
@@ -115,9 +116,13 @@ fn warnings(rows: &[Row], answers: &Answers) -> Vec<String> {
     for line in &answers.lines {
         add(line.note.as_deref(), &line.scan);
     }
+    // Cautions of rows that are no answer stand with those rows.
     for row in rows {
         let note = row.marks.note.as_deref();
-        add(note, &row.key.scan);
+        let parts = note.unwrap_or_default().split("; ");
+        for part in parts.filter(|p| !p.starts_with(WARNING)) {
+            add(Some(part), &row.key.scan);
+        }
         if row.converged() == Some(false) && note.is_none() {
             add(Some("not converged"), &row.key.scan);
         }

@@ -47,6 +47,9 @@ pub struct ScanFacts {
     pub warnings: Vec<String>,
 }
 
+/// How the note of a specimen begins whose loaded faces no bone joins.
+pub const NO_PATH: &str = "no path of bone";
+
 /// Order in which rows are answers: what carries load before what does not, converged before not, then the least stated error; among rows
 /// that state none the more exact method, then the finer.
 fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
@@ -172,6 +175,15 @@ pub fn answers(
             .filter(|r| Condition::of(&r.key) == *used)
             .collect();
         let mut answer = line(best(own.iter().copied())?, &facts(scan));
+        if answer.e_app_mpa == Some(0.0) {
+            let said = own.iter().filter_map(|r| r.marks.note.as_deref());
+            let why = said
+                .flat_map(|note| note.split("; "))
+                .find(|part| part.starts_with(NO_PATH));
+            if let Some(why) = why {
+                notes::add(&mut answer.note, why);
+            }
+        }
         let mut failure = own.iter().filter_map(|r| r.solved.as_ref()?.failure);
         answer.failure_load_n = answer
             .failure_load_n

@@ -49,10 +49,17 @@ pub struct ImageJ {
     pub grey: Grey,
 }
 
+/// More channels than ImageJ shows in colours of their own.
+const MOST_CHANNELS: usize = 7;
+
 impl ImageJ {
     /// What speaks against taking the file for one scan, in words.
     pub fn fault(&self) -> Option<String> {
         let [c, z, t] = [self.channels, self.slices, self.frames].map(|n| n.max(1));
+        // Stacks saved without naming their axes (tifffile's default for three) are many channels of one slice.
+        if c > MOST_CHANNELS && z == 1 && t == 1 {
+            return None;
+        }
         (c > 1 || z > 1 && t > 1)
             .then(|| format!("is an ImageJ hyperstack of {c} channels, {z} slices and {t} frames"))
     }

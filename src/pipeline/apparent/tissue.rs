@@ -46,7 +46,7 @@ impl Tissue {
             return Err(Error::setting(
                 "solve.material",
                 "a modulus per voxel needs the scan's values, and only the mask was kept",
-                "segment again with --keep-grey (or with --labels for a labelled scan)",
+                "segment the scan again without --no-grey (or with --labels for a labelled scan)",
             ));
         };
         if grey.grid.n != specimen.bone.grid.n {

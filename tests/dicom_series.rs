@@ -481,7 +481,7 @@ fn frames_lie_where_their_functional_groups_say() {
 /// value or one more.
 fn padded(padding: u16, limit: Option<u16>) -> Files {
     let value = |i: usize| match (i % 24, i / 24) {
-        (..8, _) => padding + u16::from(limit.is_some() && i % 2 == 0),
+        (..8, _) => padding + u16::from(limit.is_some() && i.is_multiple_of(2)),
         (_, row) if row % 4 == 0 => 1500 + (i * 7919 % 81) as u16,
         _ => 100 + (i * 7919 % 81) as u16,
     };

@@ -2,7 +2,7 @@
 //! memory beyond what the file can hold.
 //!
 //! Default: a few hundred files of each kind. A long run, `BONEPD_FUZZ_CASES` of each kind (default 36 000, over a million in
-//! all), from other random numbers with another `BONEPD_FUZZ_SEED`:
+//! all), from other random numbers with another `BONEPD_FUZZ_SEED`; only of kinds whose name holds `BONEPD_FUZZ_KIND`:
 //!
 //!     cargo test --release --test all -- --ignored --nocapture fuzz::a_million
 
@@ -148,7 +148,9 @@ fn try_sample(sample: &Sample, other: &Sample, cases: u32, seed: u64) -> Sum {
 
 /// All samples, two at a time, each on a pool of one thread so that its allocations are counted there.
 fn try_all(cases: u32, seed: u64) {
-    let samples = samples();
+    let only = std::env::var("BONEPD_FUZZ_KIND").unwrap_or_default();
+    let mut samples = samples();
+    samples.retain(|sample| sample.name.contains(&only));
     let (next, failed) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::path::Path;
 
 /// Rows of a voxel-to-world affine: world mm = `a[r][0..3] · (i, j, k) + a[r][3]`, voxel centres.
@@ -218,6 +219,17 @@ pub fn turned<T: Copy + Send + Sync>(volume: Volume<T>, turn: &Turn) -> Volume<T
         grid,
         values: values.as_standard_layout().into_owned(),
         affine: volume.affine.map(|affine| turned_affine(&affine, turn, n)),
+    }
+}
+
+/// The same of a volume that is kept; copied only where there is something to turn.
+pub fn turned_copy<'a, T: Copy + Send + Sync>(
+    volume: &'a Volume<T>,
+    turn: &Turn,
+) -> Cow<'a, Volume<T>> {
+    match turn.is_identity() {
+        true => Cow::Borrowed(volume),
+        false => Cow::Owned(turned(volume.clone(), turn)),
     }
 }
 

@@ -43,15 +43,15 @@ pub struct Input {
 /// Writes mask and record. The record goes last: where it is, the mask is whole.
 pub fn write(dir: &Path, specimen: &Specimen, record: &SegmentRecord) -> Result<()> {
     let back = record.input.axes.inverse();
-    let bone = specimen.bone.clone();
-    nifti::write(&dir.join(MASK), &orient::turned(bone, &back))?;
+    let bone = orient::turned_copy(&specimen.bone, &back);
+    nifti::write(&dir.join(MASK), &bone)?;
     match &specimen.grey {
-        Some(grey) => nifti::write_grey(&dir.join(GREY), &orient::turned(grey.clone(), &back))?,
+        Some(grey) => nifti::write_grey(&dir.join(GREY), &orient::turned_copy(grey, &back))?,
         None => drop(std::fs::remove_file(dir.join(GREY))),
     }
     let inside = specimen.threshold.as_ref().and_then(|t| t.inside.as_ref());
     match inside.filter(|_| specimen.grey.is_some()) {
-        Some(inside) => nifti::write(&dir.join(VOI), &orient::turned(inside.clone(), &back))?,
+        Some(inside) => nifti::write(&dir.join(VOI), &orient::turned_copy(inside, &back))?,
         None => drop(std::fs::remove_file(dir.join(VOI))),
     }
     let json = serde_json::to_string_pretty(record).expect("records are plain data");

@@ -52,7 +52,7 @@ def check(name, path, world, spacing=SPACING, unit=None, extra=(), grey=None, ow
             told = [info[f"grey_{what}"] for what in ("min", "max", "mean")]
             assert np.allclose(told, [grey.min(), grey.max(), grey.mean()], rtol=1e-6), (told, grey.mean())
         with tempfile.TemporaryDirectory() as out:
-            lower = () if "--lower" in extra else ("--lower", 2999.5)
+            lower = () if any(str(word).startswith("--lower") for word in extra) else ("--lower", 2999.5)
             ask("segment", path, "-o", out, *lower, "--keep-all", *extra)
             mask = nibabel.load(pathlib.Path(out) / "mask.nii.gz")
             stored = np.asarray(mask.dataobj)

@@ -1,7 +1,7 @@
 //! Owns the names of numbered files that NRRD and MetaImage headers give as `slice%03d.raw 0 7 1`.
 
-/// More files than this are a damaged number.
-const MOST: i64 = 1_000_000;
+/// More files than this are a damaged number: NIfTI-1 holds no more slices, and a million names take 90 MB.
+const MOST: i64 = 32_767;
 
 /// The names that `text` stands for: a pattern with one `%d` (`%3d`, `%03d`), first number, last number and step, where the
 /// step may be left out. None where it is no such pattern, so that it is a name itself.
@@ -48,11 +48,13 @@ mod tests {
         assert_eq!(of("a b%d 4 0 -2"), ["a b4", "a b2", "a b0"]);
         assert_eq!(of("%2d.z 9 10 1 2"), [" 9.z", "10.z"]);
         assert_eq!(of("s%d.raw 1 2"), ["s1.raw", "s2.raw"]);
+        assert_eq!(of("a%d 1 32767 1").len(), 32_767);
         for no in [
             "scan.raw",
             "100%d",
             "a %d 0 9 0",
             "a%d 0 99999999999 1",
+            "a%d 0 32767 1",
             "a%s 0 1 1",
         ] {
             assert_eq!(names(no), None, "{no}");

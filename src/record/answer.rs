@@ -51,7 +51,9 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
             .iter()
             .filter(|row| Condition::of(&row.key) == condition)
     };
-    let failure = own().filter_map(|row| row.solved.as_ref()?.failure).last();
+    let failure = own()
+        .filter_map(|row| row.solved.as_ref()?.failure)
+        .next_back();
     let AnswerLine {
         scan,
         subject,

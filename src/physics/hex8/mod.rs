@@ -119,7 +119,7 @@ const fn share_faces(around: u8) -> bool {
     while step < 7 {
         let x = (reached & 0x55) << 1 | (reached & 0xAA) >> 1;
         let y = (reached & 0x33) << 2 | (reached & 0xCC) >> 2;
-        let z = reached << 4 | reached >> 4;
+        let z = reached.rotate_left(4);
         reached |= around & (x | y | z);
         step += 1;
     }

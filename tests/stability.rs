@@ -1,28 +1,23 @@
 //! Hard cases: what each came to, how far its stated error was off, and how many mechanisms it has.
 //! `cargo test --release stability_cases -- --nocapture` prints the table.
 
+use crate::hard::direct::e_app_mpa;
 use crate::specimens::specimen;
 use crate::stopping::textbook;
 use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::Axis;
-use bonepd_ct::operator::Operator;
-use bonepd_ct::operator::probe::probe;
 use bonepd_ct::operator::sparse::Sparse;
 use bonepd_ct::physics::hex8::element::Integration;
 use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
-use bonepd_ct::pipeline::apparent::discretisation::Prepared;
 use bonepd_ct::pipeline::apparent::solve_lattice;
 use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::solved::Solved;
-use bonepd_ct::pipeline::apparent::tissue::Tissue;
-use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use bonepd_ct::pipeline::apparent::voxel_fe::supports;
 use bonepd_ct::pipeline::apparent::{Ends, SolveParams};
 use bonepd_ct::pipeline::lattice::{Boundary, Case as LatticeCase, Structure};
 use bonepd_ct::solver::amg::{Amg, AmgParams};
 use bonepd_ct::solver::cg::fallback::minimise_or_fall_back;
-use bonepd_ct::solver::cg::{CgParams, ENERGY_ALONE, Ended};
-use bonepd_ct::solver::direct::DirectLlt;
+use bonepd_ct::solver::cg::{CgParams, ENERGY_ALONE};
 use bonepd_ct::volume::Specimen;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -317,16 +312,13 @@ fn outcome(case: &Case) -> Outcome {
     }
 }
 
-/// Whether the case ended well and told the truth: the true error is at most three times the stated one (below 1e-9 both
-/// are rounding), and the count of mechanisms is what the shape says. A structure too faint for its error to be told is
-/// not said to have converged, and all of its modulus is stated as the error.
+/// Whether the case ended well: the true error is at most one and a half times the stated one (below 1e-9 both are
+/// rounding), and the count of mechanisms is what the shape says.
 fn is_well(case: &Case, o: &Outcome) -> bool {
     let e_app = o.solved.moduli.e_app_mpa;
     let counted = case.mechanisms.is_none() || case.mechanisms == o.solved.mechanisms;
-    let all = o.solved.moduli.algebraic_error_mpa >= 0.999 * e_app;
-    let faint = o.solved.ended == Ended::Faint && all;
-    let told = o.solved.ended.converged() && o.true_error <= 3.0 * o.stated + 1e-9;
-    e_app.is_finite() && e_app >= 0.0 && counted && (told || faint)
+    let held = o.solved.ended.converged() && o.true_error <= 1.5 * o.stated + 1e-9;
+    e_app.is_finite() && e_app >= 0.0 && counted && held
 }
 
 fn model_words(case: &Case) -> String {
@@ -389,39 +381,7 @@ fn a_direct_solution_is_the_iterated_one() {
             tolerance: 1e-12,
             ..poisson(nu)
         };
-        let tissue = &Tissue::of(&specimen, &params).unwrap();
-        let prepared = Prepared {
-            specimen: &specimen,
-            tissue,
-        };
-        let model = Bricks::new(prepared, &params, Keep::BetweenGrips).unwrap();
-        let mesh = model.mesh();
-        assert!(!mesh.is_empty());
-        let grips = Planes::within(&mesh.grid, Axis::Z, 0.0).unwrap();
-        let length = mesh.grid.size_mm()[2];
-        let held = supports::held(mesh, grips, &params);
-        let mut u = supports::bar(mesh, grips, params.strain * length);
-        for (node, u) in u.iter_mut().enumerate() {
-            (0..3)
-                .filter(|&c| !held.is_held(node, c))
-                .for_each(|c| u[c] = 0.0);
-        }
-        let mut force = vec![[0.0; 3]; mesh.len()];
-        model.apply(&u, &mut force);
-        let probed = probe(&model, &held, &supports::grid_places(mesh), 1);
-        let mut x: Vec<f64> = probed.unknowns.iter().map(|&(n, c)| -force[n][c]).collect();
-        let order: Vec<usize> = (0..x.len()).collect();
-        let mut llt = DirectLlt::new(&probed.matrix, &order).unwrap();
-        llt.factorize(&probed.matrix).unwrap();
-        llt.solve(&mut x);
-        probed
-            .unknowns
-            .iter()
-            .zip(&x)
-            .for_each(|(&(n, c), x)| u[n][c] = *x);
-        model.apply(&u, &mut force);
-        let strain_energy = bonepd_ct::par::dot(&u, &force);
-        let direct = strain_energy / (params.strain.powi(2) * length * specimen.area_mm2(Axis::Z));
+        let (direct, probed) = e_app_mpa(&specimen, &params);
         let solved = solve_voxels(&specimen, &params, |_| ()).unwrap();
         let off = solved.moduli.e_app_mpa / direct - 1.0;
         assert!(
@@ -483,10 +443,9 @@ fn contrast(soft: f32) -> (usize, f64, f64) {
     (iterations, e_app, exact)
 }
 
-/// Plain conjugate gradients need over 10 000 iterations to 1e-12 on the serpentine. Multigrid soon finds that it is too
-/// faint for its error to be told, and says so: its modulus is an upper bound.
+/// Plain conjugate gradients need over 10 000 iterations to 1e-12 on the serpentine, which keeps 4e-6 of a bar's energy.
 #[test]
-fn the_serpentine_is_an_upper_bound() {
+fn the_serpentine_converges() {
     let case = cases()
         .into_iter()
         .find(|c| c.what.starts_with("serpentine"))
@@ -500,8 +459,9 @@ fn the_serpentine_is_an_upper_bound() {
         found.iterations, m.e_app_mpa, m.algebraic_error_mpa
     );
     assert!(plain > 10_000 && residual < 1e-11);
-    assert_eq!(found.ended, Ended::Faint);
-    assert!(m.e_app_mpa >= exact && m.algebraic_error_mpa >= 0.999 * m.e_app_mpa);
+    assert!(found.ended.converged() && found.iterations < 200);
+    assert!((m.e_app_mpa - exact).abs() <= m.algebraic_error_mpa);
+    assert!(m.algebraic_error_mpa <= 1e-3 * m.e_app_mpa);
 }
 
 /// Prints the table of `reports/stability.md`.

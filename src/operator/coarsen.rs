@@ -27,6 +27,11 @@ pub trait Coarsen: Operator<3> {
     /// A range that holds every column of these rows. Need not be tight.
     fn reach(&self, sites: Range<usize>) -> Range<usize>;
 
+    /// Of each site of the range, whether what it joins meets there in an edge or a corner only, so that parts turn about it.
+    fn hinges(&self, _sites: Range<usize>, hinges: &mut [bool]) {
+        hinges.fill(false);
+    }
+
     /// `y[i − sites.start] = (A x)_i` for `i` in `sites`.
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]);
 
@@ -49,6 +54,10 @@ impl<O: Coarsen> Coarsen for &O {
 
     fn reach(&self, sites: Range<usize>) -> Range<usize> {
         (**self).reach(sites)
+    }
+
+    fn hinges(&self, sites: Range<usize>, hinges: &mut [bool]) {
+        (**self).hinges(sites, hinges);
     }
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {

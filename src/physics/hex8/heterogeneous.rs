@@ -11,6 +11,9 @@ use crate::par;
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// Part of the stiffest element's factor at a node below which another does not keep parts from turning about it.
+const STIFF: f32 = 0.05;
+
 /// [`super::Hex8`] with one factor per element.
 pub struct Heterogeneous {
     mesh: VoxelMesh,
@@ -111,6 +114,14 @@ impl Heterogeneous {
         })
     }
 
+    /// The bits of the elements around node `i` of a segment that are at least [`STIFF`] of the stiffest there.
+    fn stiff_around(&self, around: u8, rows: &[u32; 9], i: usize) -> u8 {
+        let factors = || self.around(around, rows, i).map(|(bit, f, _)| (bit, f));
+        let most = factors().fold(0.0, |most: f32, (_, f)| most.max(f));
+        let stiff = factors().filter(|(_, f)| *f >= STIFF * most);
+        stiff.fold(0, |bits, (bit, _)| bits | bit)
+    }
+
     /// Couplings of a node with its 27 neighbours.
     fn sum(&self, elements: impl Iterator<Item = (u8, f32, usize)>) -> [Block; 27] {
         let mut sums = [[[0.0; 3]; 3]; 27];
@@ -195,6 +206,19 @@ impl Coarsen for Heterogeneous {
 
     fn reach(&self, sites: Range<usize>) -> Range<usize> {
         self.mesh.reach(sites)
+    }
+
+    /// Of the stiff elements around each node.
+    fn hinges(&self, sites: Range<usize>, hinges: &mut [bool]) {
+        hinges.fill(false);
+        for segment in self.mesh.segments_in(sites.clone()) {
+            for (i, node) in segment.nodes().enumerate() {
+                if sites.contains(&node) {
+                    let stiff = self.stiff_around(self.mesh.around[node], &segment.rows, i);
+                    hinges[node - sites.start] = !super::share_faces(stiff);
+                }
+            }
+        }
     }
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {

@@ -92,6 +92,12 @@ impl Coarsen for Hex8 {
         self.mesh.reach(sites)
     }
 
+    fn hinges(&self, sites: Range<usize>, hinges: &mut [bool]) {
+        let around = &self.mesh.around[sites];
+        let pairs = hinges.iter_mut().zip(around);
+        pairs.for_each(|(hinge, &around)| *hinge = !share_faces(around));
+    }
+
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         kernel::rows_f64(&self.mesh, &self.double, sites, x, y);
     }
@@ -103,6 +109,21 @@ impl Coarsen for Hex8 {
     fn eigenvalue_bound(&self) -> f64 {
         self.eigenvalue_bound
     }
+}
+
+/// Whether the elements around a node (bit `x + 2 y + 4 z`) all hang together by faces.
+const fn share_faces(around: u8) -> bool {
+    // From the lowest element, what faces lead to; no path is longer than seven steps.
+    let mut reached = around & around.wrapping_neg();
+    let mut step = 0;
+    while step < 7 {
+        let x = (reached & 0x55) << 1 | (reached & 0xAA) >> 1;
+        let y = (reached & 0x33) << 2 | (reached & 0xCC) >> 2;
+        let z = reached.rotate_left(4);
+        reached |= around & (x | y | z);
+        step += 1;
+    }
+    reached == around
 }
 
 /// Where nodes are, in mm.
@@ -142,6 +163,16 @@ mod tests {
         (0..n)
             .map(|i| std::array::from_fn(|a| ((i * 3 + a) as f64 * 0.7).sin()))
             .collect()
+    }
+
+    #[test]
+    fn elements_that_meet_in_an_edge_or_a_corner_share_no_face() {
+        for around in [0b1, 0b11, 0b1111_1111, 0b0111_0101, 0b0001_0111] {
+            assert!(share_faces(around), "{around:b}");
+        }
+        for around in [0b1001, 0b1000_0001, 0b0110_0000, 0b1001_1001] {
+            assert!(!share_faces(around), "{around:b}");
+        }
     }
 
     /// Against element by element assembly from positions alone, in all precisions and instruction sets, sparse to solid.

@@ -144,11 +144,6 @@ impl Solved {
             }
             Ended::IterationLimit => Some("not converged: iteration limit reached".into()),
             Ended::Breakdown => Some("not converged: the model is not positive definite".into()),
-            Ended::Faint => Some(
-                "not converged: so little stiffness is left (below 1e-5 of a solid bar's) that its error cannot be told; \
-                 E_app is an upper bound, a smaller --tolerance brings it nearer"
-                    .into(),
-            ),
             Ended::Mechanism => Some(
                 "what connects the loaded faces only turns and shifts: E_app is 0 to rounding"
                     .into(),

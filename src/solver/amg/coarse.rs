@@ -28,7 +28,8 @@ impl Coarse {
             .into_par_iter()
             .map(|i| inverse_block(matrix.diagonal(i), gross[i]))
             .collect();
-        let (of, count) = grouping::greedy(matrix.rows(), |i, list| strengths(&matrix, i, list));
+        let (of, count) =
+            grouping::greedy(matrix.rows(), STRONG, |i, list| strengths(&matrix, i, list));
         let mut members = vec![Vec::new(); count];
         for (i, &a) in of.iter().enumerate() {
             members[a as usize].push(i as u32);
@@ -95,13 +96,19 @@ fn joined(members: &[u32], bodies: &[Body]) -> Body {
     whole
 }
 
-/// Couplings of a site, each with the Frobenius norm of its block scaled by the diagonals.
+/// Least strength of a coupling along which sites become one aggregate (Vaněk, Mandel & Brezina 1996): parts that are
+/// joined by less move on their own.
+const STRONG: f32 = 0.02;
+
+/// Couplings of a site, each with the Frobenius norm of its block over the root of the diagonal blocks' product.
 fn strengths(matrix: &BlockMatrix, i: usize, list: &mut Vec<(u32, f32)>) {
+    let norm = |block: &Block6| block.iter().map(|v| v * v).sum::<f32>().sqrt();
+    let own = norm(matrix.diagonal(i));
     list.clear();
     for (j, block, _) in matrix.row(i) {
         if j as usize != i {
-            let norm = block.iter().map(|v| v * v).sum::<f32>().sqrt();
-            list.push((j, norm));
+            let scale = (own * norm(matrix.diagonal(j as usize))).sqrt();
+            list.push((j, norm(block) / scale.max(f32::MIN_POSITIVE)));
         }
     }
 }
@@ -127,7 +134,7 @@ pub fn gross<const D: usize>(level: &impl Level<D>) -> Vec<f32> {
 }
 
 /// Share of the gross stiffness below which a motion's own is rounding: it is a mechanism, or held.
-pub const LEAST_STIFFNESS: f64 = 1e-5;
+pub const LEAST_STIFFNESS: f64 = 1e-6;
 
 /// Inverse of a diagonal block; unknowns without stiffness get zero rows and columns.
 fn inverse_block(block: &Block6, gross: f32) -> Block6 {

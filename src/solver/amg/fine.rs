@@ -38,9 +38,13 @@ impl<'a, O: Coarsen> Fine<'a, O> {
         let rows = |sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32])| {
             operator.each_row(sites, &mut |site, columns, _| visit(site, columns));
         };
-        let (of, count) = grouping::in_boxes(boxes, &rows);
+        let hinges = hinges(operator);
+        let strong = |sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32])| {
+            each_strong(operator, &diagonal, &hinges, sites, visit);
+        };
+        let (of, count) = grouping::in_boxes(boxes, &strong, &rows);
         let aggregates = Aggregates::new(&of, count);
-        drop(of);
+        drop((of, hinges));
         let frames = frames(operator, &aggregates);
         let mut fine = Fine {
             operator,
@@ -123,6 +127,46 @@ fn each_position(
         operator.positions(part.clone(), positions);
         part.zip(positions).for_each(|(site, x)| visit(site, x));
     }
+}
+
+/// Which sites are hinges.
+fn hinges(operator: &impl Coarsen) -> Vec<bool> {
+    let mut hinges = vec![false; operator.sites()];
+    let chunks = hinges.par_chunks_mut(CHUNK).enumerate();
+    chunks.for_each(|(c, hinges)| {
+        operator.hinges(c * CHUNK..c * CHUNK + hinges.len(), hinges);
+    });
+    hinges
+}
+
+/// Least strength of a coupling, its Frobenius norm over the root of the two sites' stiffness, along which sites become one
+/// aggregate (Vaněk, Mandel & Brezina 1996). Neighbours in one tissue have 0.05 or more; stiff and soft tissue part where
+/// they differ by some 30 and more. A stiff part cut by soft voxels then moves on its own on the coarser levels.
+const STRONG: f32 = 0.05;
+
+/// Calls `visit` with every site of the range and the columns of its row that are coupled strongly. A site where parts
+/// meet in an edge or a corner has none.
+fn each_strong(
+    operator: &impl Coarsen,
+    diagonal: &Diagonal,
+    hinges: &[bool],
+    sites: Range<usize>,
+    visit: &mut dyn FnMut(usize, &[u32]),
+) {
+    let mut kept = Vec::with_capacity(27);
+    operator.each_row(sites, &mut |site, columns, blocks| {
+        kept.clear();
+        if !hinges[site] {
+            let own = STRONG * STRONG * diagonal.stiffness(site);
+            let is_strong = |j: u32, block: &Block| {
+                let squared: f32 = block.as_flattened().iter().map(|v| v * v).sum();
+                squared >= own * diagonal.stiffness(j as usize) && !hinges[j as usize]
+            };
+            let pairs = columns.iter().zip(blocks);
+            kept.extend(pairs.filter(|(j, b)| is_strong(**j, b)).map(|(j, _)| *j));
+        }
+        visit(site, &kept);
+    });
 }
 
 /// A number for every box that holds a free site.

@@ -19,16 +19,18 @@ pub trait Rows: Fn(Range<usize>, &mut dyn FnMut(usize, &[u32])) + Sync {}
 
 impl<F: Fn(Range<usize>, &mut dyn FnMut(usize, &[u32])) + Sync> Rows for F {}
 
-/// Connected pieces of boxes. `boxes[i]` is a site's box, or [`NONE`] to leave it out.
-pub fn in_boxes(mut boxes: Vec<u32>, rows: &impl Rows) -> Groups {
-    let mut root = join_in_boxes(&boxes, rows);
+/// Pieces of boxes that `strong` rows connect. `boxes[i]` is a site's box, or [`NONE`] to leave it out; `all` rows say
+/// where scraps without a strong neighbour belong.
+pub fn in_boxes(mut boxes: Vec<u32>, strong: &impl Rows, all: &impl Rows) -> Groups {
+    let mut root = join_in_boxes(&boxes, strong);
     let mut size = vec![0u32; boxes.len()];
     for i in 0..boxes.len() {
         let r = find(&mut root, i as u32);
         root[i] = r;
         size[r as usize] += 1;
     }
-    join_scraps(&boxes, &mut root, &mut size, rows);
+    join_scraps(&boxes, &mut root, &mut size, strong);
+    join_scraps(&boxes, &mut root, &mut size, all);
     // A root is the smallest of its sites, so it is met first; its number takes the place of its size.
     let (mut number, mut count) = (size, 0);
     for i in 0..boxes.len() {
@@ -45,9 +47,14 @@ pub fn in_boxes(mut boxes: Vec<u32>, rows: &impl Rows) -> Groups {
     (boxes, count as usize)
 }
 
-/// A site and its neighbours, wherever all of them are still free; the rest join the aggregate they are coupled to most.
-/// `neighbours` replaces the list by (site, strength of the coupling), itself left out.
-pub fn greedy(sites: usize, neighbours: impl Fn(usize, &mut Vec<(u32, f32)>)) -> Groups {
+/// A site and its strong neighbours, wherever all of them are still free; the rest join the aggregate they are coupled to
+/// most. `neighbours` replaces the list by (site, strength of the coupling from 0 to 1), itself left out; couplings of at
+/// least `strong` are strong ones.
+pub fn greedy(
+    sites: usize,
+    strong: f32,
+    neighbours: impl Fn(usize, &mut Vec<(u32, f32)>),
+) -> Groups {
     let mut of = vec![NONE; sites];
     let mut count = 0u32;
     let mut list = Vec::new();
@@ -56,6 +63,7 @@ pub fn greedy(sites: usize, neighbours: impl Fn(usize, &mut Vec<(u32, f32)>)) ->
             continue;
         }
         neighbours(i, &mut list);
+        list.retain(|&(_, strength)| strength >= strong);
         if list.is_empty() || list.iter().any(|&(j, _)| of[j as usize] != NONE) {
             continue;
         }

@@ -10,8 +10,8 @@
 /// wherever `μ` is no larger than the smallest eigenvalue of the preconditioned operator (Meurant & Tichý 2019). That
 /// eigenvalue is approached from above by `θ_k`, the smallest one of the tridiagonal matrix that the coefficients make up
 /// (Lanczos), so `θ_k` alone would promise too much where it still falls. It is taken to fall once more as it has since
-/// two thirds of the iterations: `μ = θ_k² / θ_{2k/3}`. On the hard cases of `reports/stability.md` the true error is 0.2
-/// to 2.4 times the estimate where that passes 1e-3; extrapolating the decreases themselves was up to 15 times off.
+/// two thirds of the iterations, and a motion that costs a tenth of the first direction's is always expected to be unseen:
+/// `μ = min(θ_k² / θ_{2k/3}, θ_1 / 10) / 2.5`. The divisor was set on 214 hard bodies (`reports/stability.md`).
 #[derive(Debug, Clone)]
 pub struct EnergyTail {
     /// The Lanczos matrix: diagonal, and squares of what stands beside it.
@@ -46,7 +46,15 @@ impl Default for EnergyTail {
 /// Iterations before the first estimate: two eigenvalues tell nothing of a third.
 const LEAST_ITERATIONS: usize = 3;
 
-/// Iterations up to which the smallest eigenvalue is found anew in each; beyond, a hundred times per doubling or so.
+/// Part of the first direction's eigenvalue that an unseen motion may have. A few iterations cannot tell: of 200 hard bodies
+/// half have an eigenvalue below it.
+const UNSEEN: f64 = 0.1;
+
+/// What the estimate is multiplied by: with it the true error passes the stated one on 1 in 100 hard bodies, without it
+/// on 1 in 7.
+const SAFETY: f64 = 2.5;
+
+/// Iterations up to which the smallest eigenvalue is found again in each; beyond, a hundred times per doubling or so.
 const EACH: usize = 200;
 
 /// Past iterations whose largest effect on a functional is expected of later ones.
@@ -96,7 +104,8 @@ impl EnergyTail {
         if k >= LEAST_ITERATIONS {
             let now = self.smallest[k - 1];
             let before = self.smallest[(2 * k / 3).max(1) - 1];
-            self.estimate = Some(rz * self.phi / now * (before / now));
+            let smallest = (now * now / before).min(UNSEEN * self.diagonal[0]);
+            self.estimate = Some(SAFETY * rz * self.phi / smallest);
         }
         self.estimate
     }
@@ -179,7 +188,8 @@ mod tests {
     fn a_well_conditioned_operator() {
         let eigenvalues: Vec<f64> = (0..200).map(|k| 0.3 + 0.7 * f64::from(k) / 199.0).collect();
         let found = ratios(&eigenvalues, vec![1.0; 200], 12);
-        assert!(found.iter().all(|r| (0.9..3.0).contains(r)), "{found:?}");
+        // The safety, and eigenvalues from 0.3 on where a tenth is expected.
+        assert!(found.iter().all(|r| (2.0..25.0).contains(r)), "{found:?}");
     }
 
     /// A spectrum down to zero, as with a weak preconditioner: the smallest eigenvalue is never found, only approached.
@@ -190,7 +200,7 @@ mod tests {
         for power in [1.0, 0.5] {
             let start = eigenvalues.iter().map(|v: &f64| v.powf(power)).collect();
             let found = ratios(&eigenvalues, start, 60);
-            assert!(found.iter().all(|r| (0.33..2.0).contains(r)), "{found:?}");
+            assert!(found.iter().all(|r| (0.8..5.0).contains(r)), "{found:?}");
         }
     }
 

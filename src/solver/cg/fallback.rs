@@ -1,10 +1,12 @@
-//! Owns what to do when a strong preconditioner is found not to be positive: carry on with the diagonal one.
+//! Owns the choice of precision, and what to do when one does not suffice or a preconditioner is found not to be positive:
+//! carry on in double precision, then with the diagonal.
 
 use crate::operator::held::{Constrained, Held};
 use crate::operator::{Functional, MixedPrecision, SinglePreconditioner};
 use crate::solver::cg;
 use crate::solver::cg::jacobi::Jacobi;
 use crate::solver::cg::mixed;
+use crate::solver::cg::widened::Widened;
 use crate::solver::cg::{CgInfo, CgParams, CgStep, Ended};
 
 /// Residual, of the start's, above which the diagonal's estimate of its error is not believed. With so weak a
@@ -12,8 +14,14 @@ use crate::solver::cg::{CgInfo, CgParams, CgStep, Ended};
 /// iterations, and at a residual of 1e-3 a real stack was 4 % off, at 1e-4 0.07 % (`reports/stability.md`).
 const BELIEVED_RESIDUAL: f64 = 1e-4;
 
-/// [`mixed::minimise`]; should `preconditioner` break down, from where it came to with the diagonal, in double
-/// precision. Iterations are those of both.
+/// Largest over smallest stiffness of sites above which conjugate gradients is in double precision. In single precision
+/// what a stiff part turning rounds to is as much as what a part 1e4 times as soft bears: two random phases stood still
+/// 65 % above their modulus.
+const MOST_SPREAD: f64 = 1e4;
+
+/// [`mixed::minimise`], or conjugate gradients in double precision where stiffness differs by more than 1e4 or the former
+/// breaks down; should `preconditioner` break down, too, from where it came to with the diagonal. Iterations are those of
+/// all.
 pub fn minimise_or_fall_back<F: Functional<3>>(
     operator: &impl MixedPrecision,
     held: &Held,
@@ -23,34 +31,84 @@ pub fn minimise_or_fall_back<F: Functional<3>>(
     goal: Option<&F>,
     mut observe: impl FnMut(CgStep),
 ) -> CgInfo {
-    let first = mixed::minimise(
-        operator,
-        held,
-        preconditioner,
-        u,
-        params,
-        goal,
-        &mut observe,
-    );
-    if first.ended != Ended::Breakdown {
-        return first;
+    let mut done = None;
+    if spread(operator, held) <= MOST_SPREAD {
+        let info = mixed::minimise(
+            operator,
+            held,
+            preconditioner,
+            u,
+            params,
+            goal,
+            &mut observe,
+        );
+        if info.ended != Ended::Breakdown {
+            return info;
+        }
+        done = Some(info);
+    }
+    let widened = Widened::new(preconditioner, operator.sites());
+    let left = left_of(params, done.as_ref());
+    let info = cg::minimise(operator, held, &widened, u, &left, goal, |step| {
+        observe(after(done.as_ref(), step));
+    });
+    let info = joined(done, info);
+    if info.ended != Ended::Breakdown {
+        return info;
     }
     let diagonal = Jacobi::new(&Constrained {
         inner: operator,
         held,
     });
     let left = CgParams {
-        max_iterations: params.max_iterations.saturating_sub(first.iterations),
-        whole_energy: Some(first.start_energy),
-        believed_residual: BELIEVED_RESIDUAL / first.residual,
-        ..*params
+        believed_residual: BELIEVED_RESIDUAL / info.residual,
+        ..left_of(params, Some(&info))
     };
-    let second = cg::minimise(operator, held, &diagonal, u, &left, goal, |step| {
-        observe(CgStep {
-            iteration: first.iterations + step.iteration,
-            ..step
-        });
+    let last = cg::minimise(operator, held, &diagonal, u, &left, goal, |step| {
+        observe(after(Some(&info), step));
     });
+    joined(Some(info), last)
+}
+
+/// Largest over smallest entry of the diagonal that is free and not zero.
+fn spread(operator: &impl MixedPrecision, held: &Held) -> f64 {
+    let mut diagonal = vec![[0.0; 3]; operator.sites()];
+    operator.diagonal(&mut diagonal);
+    let (mut least, mut most) = (f64::INFINITY, 0.0f64);
+    for (site, d) in diagonal.iter().enumerate() {
+        for (c, &d) in d.iter().enumerate() {
+            if d > 0.0 && !held.is_held(site, c) {
+                (least, most) = (least.min(d), most.max(d));
+            }
+        }
+    }
+    if most > 0.0 { most / least } else { 1.0 }
+}
+
+/// What `params` leave to a solve that goes on from another.
+fn left_of(params: &CgParams, done: Option<&CgInfo>) -> CgParams {
+    match done {
+        None => *params,
+        Some(done) => CgParams {
+            max_iterations: params.max_iterations.saturating_sub(done.iterations),
+            whole_energy: Some(done.start_energy),
+            ..*params
+        },
+    }
+}
+
+/// A step of a solve that goes on from another, counted from the first one's start.
+fn after(done: Option<&CgInfo>, step: CgStep) -> CgStep {
+    CgStep {
+        iteration: step.iteration + done.map_or(0, |d| d.iterations),
+        ..step
+    }
+}
+
+fn joined(first: Option<CgInfo>, second: CgInfo) -> CgInfo {
+    let Some(first) = first else {
+        return second;
+    };
     CgInfo {
         iterations: first.iterations + second.iterations,
         residual: first.residual * second.residual,

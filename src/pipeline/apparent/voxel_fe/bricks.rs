@@ -15,9 +15,6 @@ use crate::pipeline::apparent::tissue::{Mixed, Tissue};
 use crate::volume::Specimen;
 use std::ops::Range;
 
-/// Above this Poisson's ratio the dilatation is averaged over each element: full integration locks as ν → ½.
-pub const LOCKING_POISSON: f64 = 0.4;
-
 /// Bone fraction of a coarsened voxel below which it is no element.
 pub(super) const LEAST_FRACTION: f32 = 0.02;
 
@@ -61,7 +58,7 @@ impl Bricks {
             }
         };
         let (young, nu) = (solid.young_mpa, solid.poisson);
-        let rule = rule(nu);
+        let rule = Integration::of(nu);
         if params.coarsen > 1 {
             let fractions = resample::coarsen(&specimen.bone, params.coarsen);
             let values = fractions.as_slice();
@@ -120,14 +117,6 @@ fn refuse_long_voxels(grid: Grid) -> Result<()> {
     ))
 }
 
-pub(super) fn rule(poisson: f64) -> Integration {
-    if poisson > LOCKING_POISSON {
-        Integration::MeanDilatation
-    } else {
-        Integration::Full
-    }
-}
-
 /// Elements of tissue that differs from voxel to voxel.
 fn of_mixed(
     specimen: &Specimen,
@@ -135,7 +124,11 @@ fn of_mixed(
     params: &SolveParams,
     keep: Keep,
 ) -> Result<Heterogeneous> {
-    let kinds: Vec<(f64, Integration)> = mixed.poissons.iter().map(|&nu| (nu, rule(nu))).collect();
+    let kinds: Vec<(f64, Integration)> = mixed
+        .poissons
+        .iter()
+        .map(|&nu| (nu, Integration::of(nu)))
+        .collect();
     let young = mixed.mean_mpa;
     if params.coarsen > 1 {
         if kinds.len() > 1 {
@@ -219,6 +212,13 @@ impl Coarsen for Bricks {
 
     fn reach(&self, sites: Range<usize>) -> Range<usize> {
         self.mesh().reach(sites)
+    }
+
+    fn hinges(&self, sites: Range<usize>, hinges: &mut [bool]) {
+        match self {
+            Bricks::Homogeneous(model) => model.hinges(sites, hinges),
+            Bricks::Heterogeneous(model) => model.hinges(sites, hinges),
+        }
     }
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {

@@ -3,12 +3,13 @@
 use crate::error::Result;
 use crate::mask::resample;
 use crate::measure::surface_energy::{Element, SurfaceEnergy, surface_energy};
+use crate::physics::hex8::element::Integration;
 use crate::physics::hex8::fields::{Brick, Kind, bricks, sample};
 use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::fields::{Field, FieldVolume, Recorded};
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, rule};
+use crate::pipeline::apparent::voxel_fe::bricks::Bricks;
 use crate::volume::{Specimen, Volume};
 
 /// Fields and failure load of a solved model, as far as the settings ask for them.
@@ -21,7 +22,11 @@ pub fn record(
 ) -> Result<Recorded> {
     let Prepared { specimen, tissue } = prepared;
     let surface = match tissue {
-        Tissue::Uniform(s) => surface(model, &[(s.young_mpa, s.poisson, rule(s.poisson))], u),
+        Tissue::Uniform(s) => surface(
+            model,
+            &[(s.young_mpa, s.poisson, Integration::of(s.poisson))],
+            u,
+        ),
         Tissue::Mixed(_) => None,
     };
     if params.fields.is_empty() && params.pistoia.is_none() {
@@ -31,9 +36,9 @@ pub fn record(
         });
     }
     let kinds: Vec<Kind> = match tissue {
-        Tissue::Uniform(s) => vec![(s.young_mpa, s.poisson, rule(s.poisson))],
+        Tissue::Uniform(s) => vec![(s.young_mpa, s.poisson, Integration::of(s.poisson))],
         Tissue::Mixed(m) => {
-            let kind = |&nu: &f64| (m.mean_mpa, nu, rule(nu));
+            let kind = |&nu: &f64| (m.mean_mpa, nu, Integration::of(nu));
             m.poissons.iter().map(kind).collect()
         }
     };

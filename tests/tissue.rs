@@ -214,7 +214,7 @@ fn what_has_no_modulus_is_refused_in_words() {
         ..block
     };
     let kept = refused(&mask_only, &params(labels([500.0, 0.3], [900.0, 0.3])));
-    assert!(kept.contains("--keep-grey"), "{kept}");
+    assert!(kept.contains("--no-grey"), "{kept}");
 }
 
 /// From a labelled file to a row of results, by the command line and by a recipe.

@@ -177,7 +177,8 @@ fn hard_cases_converge() {
                 poisson: 0.499,
                 ..plain()
             },
-            60,
+            // 65 with an error estimate that expects unseen motions, which costs some fifth of the iterations.
+            75,
         ),
         (
             "auxetic",

@@ -208,7 +208,7 @@ def read(path, key):
 
 
 def well_known(truth):
-    return all(float(truth[f"uncertainty_{of}_mpa"]) <= KNOWN_TO * float(truth[f"e_{of}_mpa"]) for of in ("body", "image"))
+    return float(truth["e_body_mpa"]) > 0 and all(float(truth[f"uncertainty_{of}_mpa"]) <= KNOWN_TO * float(truth[f"e_{of}_mpa"]) for of in ("body", "image"))
 
 
 def load():

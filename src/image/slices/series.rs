@@ -1,4 +1,4 @@
-//! Owns which files of a folder are the slices of one scan, told by the numbers in their names: one series, none missing.
+//! Owns which files of a folder are the slices of one scan, by the numbers in their names: one series, none missing.
 
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;

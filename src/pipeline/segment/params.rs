@@ -99,7 +99,7 @@ pub(super) const MOST_LABEL: i32 = 1 << 24;
 const MAX_SIGMA: f64 = 20.0;
 
 impl SegmentParams {
-    /// In a word, how bone is told.
+    /// How bone is found, in a word.
     pub fn threshold(&self) -> &'static str {
         match self.labels.is_empty() {
             false => "labels",
@@ -108,7 +108,7 @@ impl SegmentParams {
         }
     }
 
-    /// Whether a window, in the image's own units, tells bone.
+    /// Whether a window, in the image's own units, decides what bone is.
     pub fn has_window(&self) -> bool {
         !self.otsu && (self.lower.is_some() || self.upper.is_some())
     }

@@ -1,4 +1,4 @@
-//! Owns what is done to a scan before bone is told in it: cropped, turned, resampled, rotated, in that order.
+//! Owns what is done to a scan before bone is found in it: cropped, turned, resampled, rotated, in that order.
 
 use super::params::{Align, AlignBox};
 use super::region::{check_crop, same_grid};

@@ -29,7 +29,7 @@ pub struct Cut {
 /// Equilibrium under unit load of a body some of whose bonds are broken after its factorisation.
 pub struct Window<const D: usize> {
     factorised: Factorised,
-    zone: SchurComplement,
+    schur: SchurComplement,
     /// Points of the window, in order of elimination.
     points: Vec<u32>,
     local: Vec<u32>,
@@ -68,7 +68,7 @@ impl<const D: usize> Window<D> {
         let mut factorised = factorise(body, &setup.points, held, &[], chosen)?;
         let load = right_hand_side(body, &factorised, held, &[]);
         let size = chosen.len() * D;
-        let zone = SchurComplement::new(&factorised.llt.corner(size), size);
+        let schur = SchurComplement::new(&factorised.llt.corner(size), size);
         let mut q = load.clone();
         factorised.llt.solve(&mut q);
         let x = factorised.expand(&q, held);
@@ -83,7 +83,7 @@ impl<const D: usize> Window<D> {
         let whole = |&p: &usize| setup.family.of(p).all(|(q, _)| inside(q));
         let first: Vec<f64> = chosen.iter().flat_map(|&p| x[p]).collect();
         let window = Window {
-            zone,
+            schur,
             points: chosen.iter().map(|&p| p as u32).collect(),
             inner: chosen.iter().map(whole).collect(),
             local,
@@ -179,10 +179,10 @@ impl<const D: usize> Window<D> {
         let change = |x: &[f64], y: &mut [f64]| add_forces(fresh, blocks, x, y);
         let scale = self.stored.sqrt();
         let info = self
-            .zone
+            .schur
             .solve(change, &b, &mut self.since, scale, TOLERANCE);
         let moved: Vec<f64> = self.since.iter().zip(&before).map(|(n, b)| n - b).collect();
-        let mut force = self.zone.multiply(&moved);
+        let mut force = self.schur.multiply(&moved);
         let mut given = vec![0.0; moved.len()];
         add_forces(fresh, blocks, &moved, &mut given);
         force.iter_mut().zip(&given).for_each(|(f, g)| *f -= g);
@@ -204,7 +204,7 @@ impl<const D: usize> Window<D> {
     /// Renews the dense factor without the first `count` broken bonds. False if there is none.
     fn absorb(&mut self, blocks: &[Blocks<D>], count: usize) -> bool {
         let fresh = &self.broken[self.fresh..count];
-        let done = self.zone.absorb(entries(fresh, blocks));
+        let done = self.schur.absorb(entries(fresh, blocks));
         if done {
             self.fresh = count;
             self.absorbed.push(count);

@@ -21,12 +21,16 @@ pub struct Coarse {
 }
 
 impl Coarse {
-    /// A level over `bodies`, aggregated by its own graph; the bodies of the next. `gross` tells of each site how stiff
-    /// its parts are, see [`gross`].
-    pub fn new(matrix: BlockMatrix, bodies: &[Body], gross: &[f32]) -> (Self, Vec<Body>) {
+    /// A level over `bodies`, aggregated by its own graph; the bodies of the next. `mean_site_stiffness` is how stiff the parts of each
+    /// site are, see [`mean_site_stiffness`].
+    pub fn new(
+        matrix: BlockMatrix,
+        bodies: &[Body],
+        mean_site_stiffness: &[f32],
+    ) -> (Self, Vec<Body>) {
         let inverse: Vec<Block6> = (0..matrix.rows())
             .into_par_iter()
-            .map(|i| inverse_block(matrix.diagonal(i), gross[i]))
+            .map(|i| inverse_block(matrix.diagonal(i), mean_site_stiffness[i]))
             .collect();
         let (of, count) =
             grouping::greedy(matrix.rows(), STRONG, |i, list| strengths(&matrix, i, list));
@@ -115,7 +119,7 @@ fn strengths(matrix: &BlockMatrix, i: usize, list: &mut Vec<(u32, f32)>) {
 
 /// The stiffness of each aggregate's sites, on average: what the stiffness of the aggregate as a whole is the small
 /// remainder of, so that its rounding is that of this.
-pub fn gross<const D: usize>(level: &impl Level<D>) -> Vec<f32> {
+pub fn mean_site_stiffness<const D: usize>(level: &impl Level<D>) -> Vec<f32> {
     let mut sums = vec![[0f32; 2]; level.aggregates().count];
     let visit = |sites: Range<usize>, sums: &mut Sums<[f32; 2]>| {
         for site in sites {
@@ -133,13 +137,13 @@ pub fn gross<const D: usize>(level: &impl Level<D>) -> Vec<f32> {
         .collect()
 }
 
-/// Share of the gross stiffness below which a motion's own is rounding: it is a mechanism, or held.
+/// Share of the mean_site_stiffness stiffness below which a motion's own is rounding: it is a mechanism, or held.
 pub const LEAST_STIFFNESS: f64 = 1e-6;
 
 /// Inverse of a diagonal block; unknowns without stiffness get zero rows and columns.
-fn inverse_block(block: &Block6, gross: f32) -> Block6 {
+fn inverse_block(block: &Block6, mean_site_stiffness: f32) -> Block6 {
     let a = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(block[6 * c + r])));
-    let b = rigid::orthonormalise_to(&a, f64::from(gross), LEAST_STIFFNESS).basis;
+    let b = rigid::orthonormalise_to(&a, f64::from(mean_site_stiffness), LEAST_STIFFNESS).basis;
     std::array::from_fn(|k| (0..6).map(|m| b[k % 6][m] * b[k / 6][m]).sum::<f64>() as f32)
 }
 

@@ -22,10 +22,10 @@ pub struct Coarsest {
 }
 
 impl Coarsest {
-    /// `gross`: as for [`super::coarse::Coarse::new`].
-    pub fn new(matrix: &BlockMatrix, gross: &[f32]) -> Self {
+    /// `mean_site_stiffness`: as for [`super::coarse::Coarse::new`].
+    pub fn new(matrix: &BlockMatrix, mean_site_stiffness: &[f32]) -> Self {
         let n = 6 * matrix.rows();
-        let scale = unit_scaling(matrix, gross);
+        let scale = unit_scaling(matrix, mean_site_stiffness);
         let mut a = vec![0.0; n * n];
         for i in 0..matrix.rows() {
             for (j, block, transposed) in matrix.row(i) {
@@ -81,12 +81,12 @@ impl Coarsest {
     }
 }
 
-fn unit_scaling(matrix: &BlockMatrix, gross: &[f32]) -> Vec<f64> {
+fn unit_scaling(matrix: &BlockMatrix, mean_site_stiffness: &[f32]) -> Vec<f64> {
     let mut scale = vec![0.0; 6 * matrix.rows()];
     for i in 0..matrix.rows() {
         for c in 0..6 {
             let d = f64::from(matrix.diagonal(i)[7 * c]);
-            let least = LEAST_STIFFNESS * f64::from(gross[i]);
+            let least = LEAST_STIFFNESS * f64::from(mean_site_stiffness[i]);
             scale[6 * i + c] = if d > least { d.sqrt().recip() } else { 0.0 };
         }
     }

@@ -120,7 +120,7 @@ impl Diagonal {
     }
 }
 
-/// Kinds up to which a site's is told by two bytes: their table should stay in the cache.
+/// Kinds up to which the kind of a site takes two bytes: their table should stay in the cache.
 const MOST_KINDS: usize = 4096;
 
 #[inline]

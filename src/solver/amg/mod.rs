@@ -27,7 +27,7 @@ use crate::operator::SinglePreconditioner;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use chebyshev::Chebyshev;
-use coarse::{Coarse, gross};
+use coarse::{Coarse, mean_site_stiffness};
 use coarsest::Coarsest;
 use cycle::{Smoothing, Vectors, cycle};
 use fine::Fine;
@@ -85,11 +85,11 @@ impl<'a, O: Coarsen> Amg<'a, O> {
         let (fine, mut bodies) = Fine::new(operator, held, params.box_mm);
         let how = smoothing(&fine, params.degrees[0]);
         let mut matrix = galerkin::product(&fine, how.omega, Some(&bodies));
-        let mut below = gross(&fine);
+        let mut below = mean_site_stiffness(&fine);
         let mut coarse: Vec<(Coarse, Smoothing)> = Vec::new();
         while matrix.rows() > params.coarsest {
             let (level, next) = Coarse::new(matrix, &bodies, &below);
-            below = gross(&level);
+            below = mean_site_stiffness(&level);
             let how = smoothing(&level, params.degrees[1]);
             matrix = galerkin::product(&level, how.omega, None);
             let stuck = 10 * next.len() > 9 * level.sites();

@@ -9,15 +9,20 @@ use crate::solver::cg::mixed;
 use crate::solver::cg::widened::Widened;
 use crate::solver::cg::{CgInfo, CgParams, CgStep, Ended};
 
-/// Residual, of the start's, above which the diagonal's estimate of its error is not believed. With so weak a
+/// Residual, of the start's, above which the diagonal's estimate of its error is not trusted. With so weak a
 /// preconditioner slow motions are found late: a phantom of BV/TV 0.1 stood still 26 % above its modulus for a hundred
 /// iterations, and at a residual of 1e-3 a real stack was 4 % off, at 1e-4 0.07 % (`reports/stability.md`).
-const BELIEVED_RESIDUAL: f64 = 1e-4;
+const TRUSTED_RESIDUAL: f64 = 1e-4;
 
 /// Largest over smallest stiffness of sites above which conjugate gradients is in double precision. In single precision
 /// what a stiff part turning rounds to is as much as what a part 1e4 times as soft bears: two random phases stood still
 /// 65 % above their modulus.
 const MOST_SPREAD: f64 = 1e4;
+
+/// Residual, of the start's, above which an estimated error is not trusted where stiffness differs by more than
+/// [`MOST_SPREAD`], times that spread. The residual is mostly the stiff parts' force, beside which the soft parts' vanishes: two
+/// random phases at a contrast of 1e6 stood still 32 % above their modulus at residuals of 1e-5 to 1e-6.
+const SOFT_RESIDUAL: f64 = 0.1;
 
 /// [`mixed::minimise`], or conjugate gradients in double precision where stiffness differs by more than 1e4 or the former
 /// breaks down; should `preconditioner` break down, too, from where it came to with the diagonal. Iterations are those of
@@ -32,13 +37,17 @@ pub fn minimise_or_fall_back<F: Functional<3>>(
     mut observe: impl FnMut(CgStep),
 ) -> CgInfo {
     let mut done = None;
-    if spread(operator, held) <= MOST_SPREAD {
+    let mut params = *params;
+    let spread = spread(operator, held);
+    if spread > MOST_SPREAD {
+        params.trusted_residual = params.trusted_residual.min(SOFT_RESIDUAL / spread);
+    } else {
         let info = mixed::minimise(
             operator,
             held,
             preconditioner,
             u,
-            params,
+            &params,
             goal,
             &mut observe,
         );
@@ -48,7 +57,7 @@ pub fn minimise_or_fall_back<F: Functional<3>>(
         done = Some(info);
     }
     let widened = Widened::new(preconditioner, operator.sites());
-    let left = left_of(params, done.as_ref());
+    let left = left_of(&params, done.as_ref());
     let info = cg::minimise(operator, held, &widened, u, &left, goal, |step| {
         observe(after(done.as_ref(), step));
     });
@@ -61,8 +70,8 @@ pub fn minimise_or_fall_back<F: Functional<3>>(
         held,
     });
     let left = CgParams {
-        believed_residual: BELIEVED_RESIDUAL / info.residual,
-        ..left_of(params, Some(&info))
+        trusted_residual: TRUSTED_RESIDUAL / info.residual,
+        ..left_of(&params, Some(&info))
     };
     let last = cg::minimise(operator, held, &diagonal, u, &left, goal, |step| {
         observe(after(Some(&info), step));
@@ -91,7 +100,7 @@ fn left_of(params: &CgParams, done: Option<&CgInfo>) -> CgParams {
         None => *params,
         Some(done) => CgParams {
             max_iterations: params.max_iterations.saturating_sub(done.iterations),
-            whole_energy: Some(done.start_energy),
+            reference_energy: Some(done.start_energy),
             ..*params
         },
     }

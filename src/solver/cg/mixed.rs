@@ -1,8 +1,8 @@
 //! Owns conjugate gradients in mixed precision, for large models: 72 bytes a site in all instead of 150.
 //!
 //! The displacements are in double precision, residual, direction and their images in single. What single precision
-//! loses is had back by making the residual and the energy anew from the displacements, in double precision, whenever
-//! one of them has fallen by a thousand (van der Vorst & Ye 2000); so any accuracy is reached that double precision
+//! loses is restored: residual and energy are computed again from the displacements, in double precision, whenever one of
+//! them has fallen by a thousand (van der Vorst & Ye 2000); so any accuracy is reached that double precision
 //! allows.
 
 use crate::operator::held::Held;
@@ -10,11 +10,12 @@ use crate::operator::{Functional, MixedPrecision, SinglePreconditioner};
 use crate::par::{CHUNK, sum_chunks};
 use crate::solver::cg::error::EnergyTail;
 use crate::solver::cg::{
-    CgInfo, CgParams, CgStep, Ended, NOTHING, State, checked, energy_error, goal_error, is_met,
+    CgInfo, CgParams, CgStep, Ended, MECHANISM_ENERGY, State, checked, energy_error, goal_error,
+    is_met,
 };
 use rayon::prelude::*;
 
-/// Fall of the residual's norm, or of the energy, after which both are made anew: far enough from what single precision resolves.
+/// Fall of the residual's norm, or of the energy, after which both are computed again: far enough from what single precision resolves.
 const REPLACE: f64 = 1e-3;
 
 /// Energy, of that made the last time, above which it has risen by more than rounding: each iteration should lower it.
@@ -41,7 +42,7 @@ pub fn minimise<F: Functional<3>>(
     let (mut r, mut p, mut z, mut spare): (Single, Single, Single, Single) =
         (room(), room(), room(), room());
     let start = residual(operator, held, u, 1.0, &mut r);
-    let whole = params.whole_energy.unwrap_or(start.energy);
+    let whole = params.reference_energy.unwrap_or(start.energy);
     // One unit of the single-precision vectors, in the units of `u`.
     let mut unit = start.norm;
     let mut tail = EnergyTail::default();
@@ -114,7 +115,7 @@ pub fn minimise<F: Functional<3>>(
             if ended == Ended::Breakdown {
                 break;
             }
-            if now.energy <= NOTHING * whole {
+            if now.energy <= MECHANISM_ENERGY * whole {
                 ended = Ended::Mechanism;
             } else if norm == 0.0 {
                 ended = Ended::ResidualTolerance;
@@ -349,7 +350,7 @@ pub(super) mod tests {
         (held, u)
     }
 
-    /// The stretch of a chain to ten digits more than single precision has, by making the residual anew.
+    /// The stretch of a chain to ten digits more than single precision has, by computing the residual again.
     #[test]
     fn single_precision_vectors_do_not_limit_the_result() {
         let n = 120;
@@ -399,7 +400,7 @@ pub(super) mod tests {
         );
     }
 
-    /// A preconditioner that is not symmetric spoils the recurrences; what they then say is not believed.
+    /// A preconditioner that is not symmetric spoils the recurrences; what they then say is not trusted.
     #[test]
     fn an_energy_that_is_not_what_the_iterations_say_is_a_breakdown() {
         assert_eq!(

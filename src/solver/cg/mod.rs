@@ -20,11 +20,11 @@ pub struct CgParams {
     pub energy_tolerance: f64,
     /// `‖r‖ / ‖r₀‖` at which to stop.
     pub residual_tolerance: f64,
-    /// `‖r‖ / ‖r₀‖` above which an estimated error is not believed.
-    pub believed_residual: f64,
+    /// `‖r‖ / ‖r₀‖` above which an estimated error is not trusted.
+    pub trusted_residual: f64,
     pub max_iterations: usize,
-    /// Energy `uᵀAu` that too little and nothing are measured by; the start's where there is none.
-    pub whole_energy: Option<f64>,
+    /// Energy `uᵀAu` that a mechanism's is compared with; the start's where there is none.
+    pub reference_energy: Option<f64>,
 }
 
 impl Default for CgParams {
@@ -32,16 +32,16 @@ impl Default for CgParams {
         CgParams {
             energy_tolerance: 1e-3,
             residual_tolerance: 1e-12,
-            believed_residual: f64::INFINITY,
+            trusted_residual: f64::INFINITY,
             max_iterations: 200_000,
-            whole_energy: None,
+            reference_energy: None,
         }
     }
 }
 
-/// Part of the start's energy below which the rest is nothing. The start is the field of a homogeneous bar: 1e-10 of it is
+/// Part of the start's energy below which the faces are joined by a mechanism. The start is the field of a homogeneous bar: 1e-10 of it is
 /// far below any bone's stiffness and far above double precision's rounding.
-pub(super) const NOTHING: f64 = 1e-10;
+pub(super) const MECHANISM_ENERGY: f64 = 1e-10;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ended {
@@ -135,7 +135,7 @@ pub fn minimise<F: Functional<D>, const D: usize>(
     held.clear(&mut r);
     negate(&mut r);
     let start_norm = dot(&r, &r).sqrt();
-    let whole = params.whole_energy.unwrap_or(start_energy);
+    let whole = params.reference_energy.unwrap_or(start_energy);
     let mut z = vec![[0.0; D]; n];
     let mut p = vec![[0.0; D]; n];
     // A p of the last iteration.
@@ -161,7 +161,7 @@ pub fn minimise<F: Functional<D>, const D: usize>(
                 residual,
                 energy_error: error,
             });
-            let believed = error.filter(|_| residual <= params.believed_residual);
+            let believed = error.filter(|_| residual <= params.trusted_residual);
             if is_met(params, believed) {
                 ended = Ended::EnergyTolerance;
                 break;
@@ -195,7 +195,7 @@ pub fn minimise<F: Functional<D>, const D: usize>(
         }
         if residual <= params.residual_tolerance {
             ended = Ended::ResidualTolerance;
-        } else if start_energy - tail.total() <= NOTHING * whole {
+        } else if start_energy - tail.total() <= MECHANISM_ENERGY * whole {
             ended = Ended::Mechanism;
         }
     }

@@ -54,8 +54,8 @@ impl SingleCholesky {
         if size == 0.0 || !size.is_finite() {
             return;
         }
-        let rough: Vec<f32> = scaled().map(|v| (v / size) as f32).collect();
-        self.x.copy_from_slice(&rough);
+        let single: Vec<f32> = scaled().map(|v| (v / size) as f32).collect();
+        self.x.copy_from_slice(&single);
         let n = self.x.len();
         LltRef::new(&self.symbolic, &self.numeric[..]).solve_in_place_with_conj(
             Conj::No,
@@ -63,8 +63,8 @@ impl SingleCholesky {
             Par::Seq,
             MemStack::new(&mut self.scratch),
         );
-        for ((x, s), rough) in x.iter_mut().zip(&self.scale).zip(&self.x) {
-            *x = *rough as f64 * size * s;
+        for ((x, s), single) in x.iter_mut().zip(&self.scale).zip(&self.x) {
+            *x = *single as f64 * size * s;
         }
     }
 }

@@ -12,7 +12,7 @@ pub struct SchurComplement {
     factor: Mat<f64>,
 }
 
-/// The result of a zone's solve.
+/// The result of a solve with the Schur complement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZoneInfo {
     pub iterations: usize,
@@ -141,16 +141,16 @@ fn combine(p: &mut [f64], z: &[f64], beta: f64) {
 mod tests {
     use super::*;
 
-    /// A zone whose S is tridiagonal (2, -1) loses its spring between rows 3 and 4.
+    /// A Schur complement, tridiagonal (2, -1), that loses its spring between rows 3 and 4.
     #[test]
-    fn a_changed_zone_solves_the_changed_system() {
+    fn a_changed_complement_solves_the_changed_system() {
         let n = 12;
         let s = Mat::from_fn(n, n, |i, j| match i.abs_diff(j) {
             0 => 2.0,
             1 => -1.0,
             _ => 0.0,
         });
-        let mut zone = SchurComplement {
+        let mut schur = SchurComplement {
             factor: s.llt(faer::Side::Lower).unwrap().L().to_owned(),
         };
         let cut = |x: &[f64], y: &mut [f64]| {
@@ -159,7 +159,7 @@ mod tests {
         };
         let b: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
         let mut d = vec![0.0; n];
-        let info = zone.solve(cut, &b, &mut d, 1.0, 1e-13);
+        let info = schur.solve(cut, &b, &mut d, 1.0, 1e-13);
         // A change of rank one needs two iterations.
         assert!(info.converged && info.iterations <= 3, "{info:?}");
         let residual = |d: &[f64]| {
@@ -174,9 +174,9 @@ mod tests {
         };
         assert!(residual(&d) < 1e-12);
         let entries = [(3, 3, 0.9), (4, 4, 0.9), (3, 4, -0.9), (4, 3, -0.9)];
-        assert!(zone.absorb(entries.into_iter()));
+        assert!(schur.absorb(entries.into_iter()));
         let mut d = vec![0.0; n];
-        let info = zone.solve(|_, _| {}, &b, &mut d, 1.0, 1e-13);
+        let info = schur.solve(|_, _| {}, &b, &mut d, 1.0, 1e-13);
         assert!(info.iterations <= 1 && residual(&d) < 1e-12);
     }
 }

@@ -107,6 +107,7 @@ impl Climb<'_> {
                 .map(|learnt| shape::of_interpolated(blur_voxels, &learnt));
             if let Some((fine, stated)) = fine.zip(stated) {
                 self.state(&fine, stated)?;
+                self.contradict(one, &fine, stated)?;
             }
             let left_open = stated.map_or(0.0, |stated| stated.shape);
             if self.is_done() || (self.target >= ONE_REFINEMENT && left_open > self.target) {
@@ -137,6 +138,19 @@ impl Climb<'_> {
         self.rows.iter_mut().for_each(put);
         self.scan.results().edit_rows(put)?;
         self.answer()
+    }
+
+    /// Where finer elements lie outside the stated error of `one` element a voxel, that error becomes the difference and the
+    /// finer elements' error together: cracks that voxels bridge look like stiff bone.
+    fn contradict(&mut self, one: Option<&Row>, fine: &Row, of_fine: Stated) -> Result<()> {
+        let Some((one, moduli)) = one.zip(one.and_then(Row::e_app_mpa).zip(fine.e_app_mpa()))
+        else {
+            return Ok(());
+        };
+        match shape::contradicted(one.error(), moduli, of_fine) {
+            Some(stated) => self.state(one, stated),
+            None => Ok(()),
+        }
     }
 
     fn answer(&self) -> Result<()> {

@@ -104,6 +104,17 @@ pub fn of_one_solve(image: Image, elements: Elements, size: f64, surface: f64) -
     })
 }
 
+/// The error of one element a voxel whose modulus finer elements, of `of_fine`, put outside its stated `error`; None where they
+/// agree. `moduli`: that of one element a voxel, that of finer ones.
+pub fn contradicted(error: Option<f64>, moduli: (f64, f64), of_fine: Stated) -> Option<Stated> {
+    let (one, fine) = moduli;
+    let apart = (one - fine).abs() / one;
+    (apart > error?).then(|| Stated {
+        discretization: apart + of_fine.discretization * fine / one,
+        shape: of_fine.shape * fine / one,
+    })
+}
+
 /// The shape error of a lattice's modulus, relative: that of a mask. None where the thickness of struts is not known.
 pub fn of_lattice(row: &Row) -> Option<f64> {
     let voxel_mm = row.key.voxel_mm.iter().product::<f64>().cbrt();
@@ -138,6 +149,19 @@ mod tests {
         let blurred = of_interpolated(0.86, &learnt);
         let expected = (0.14f64.powi(2) + 0.018f64.powi(2) + 0.04f64.powi(2)).sqrt();
         assert!((blurred.discretization + blurred.shape - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_contradicted_model_reaches_the_finer_one_and_its_error() {
+        let of_fine = Stated {
+            discretization: 0.1,
+            shape: 0.1,
+        };
+        assert_eq!(contradicted(Some(0.3), (10.0, 8.0), of_fine), None);
+        assert_eq!(contradicted(None, (10.0, 8.0), of_fine), None);
+        let stated = contradicted(Some(0.15), (10.0, 8.0), of_fine).unwrap();
+        // From 10 down to 8 and 20 % of that.
+        assert!((stated.discretization + stated.shape - 0.36).abs() < 1e-12);
     }
 
     #[test]

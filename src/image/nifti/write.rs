@@ -65,7 +65,7 @@ pub fn write<T: Voxel>(path: &Path, volume: &Volume<T>) -> Result<()> {
 /// Grey values: where all are whole numbers of 16 bits, as those, which takes half the space and time.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_grey(path: &Path, volume: &Volume<f32>) -> Result<()> {
     if let Some(values) = whole::<i16>(volume) {
         return write(path, &values);

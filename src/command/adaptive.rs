@@ -229,7 +229,9 @@ fn finish(
             percent(error),
             in_words(row)
         )),
-        None => session.warn("no error could be stated: no solve converged"),
+        None => {
+            session.warn("no error could be stated: no solve converged, or the rows' notes say why")
+        }
     }
     if !met {
         let nearest = best(&rows);

@@ -22,6 +22,7 @@ use crate::record::specimen;
 use crate::result::cautions;
 use crate::result::derived::with_derived;
 use crate::result::extrapolate::is_extrapolated;
+use crate::result::notes;
 use crate::result::row::{FailureLoad, Marks, Row};
 use crate::result::settings::{BoundaryRule, Settings};
 use crate::result::shape;
@@ -279,11 +280,24 @@ impl OpenScan {
         let sensitivity = row.solved.as_ref().and_then(|s| s.threshold_sensitivity);
         let voxel_mm = self.specimen.bone.grid.voxel_mm3().cbrt();
         let size = row.key.lp_mm / voxel_mm;
-        if let Some(elements) = row.key.elements {
+        if self.has_interfaces(row) {
+            shape::state(row, None);
+            notes::add(&mut row.marks.note, shape::INTERFACES);
+        } else if let Some(elements) = row.key.elements {
             let surface = self.surface(sensitivity);
             let stated = shape::of_one_solve(self.image, elements, size, surface);
             shape::state(row, stated);
         }
+    }
+
+    /// Whether labelled tissues differ by so much that their interfaces matter.
+    fn has_interfaces(&self, row: &Row) -> bool {
+        let labelled = row
+            .key
+            .material
+            .as_ref()
+            .is_some_and(|law| law.starts_with("labels"));
+        labelled && self.tissue.contrast(self.specimen.bone.as_slice()) > shape::MOST_CONTRAST
     }
 
     /// Struts thinner than two lattice parameters are one or two sites thick, which sites of firm and floppy lattices
@@ -303,8 +317,9 @@ impl OpenScan {
         let coarse: Vec<String> = coarse.iter().map(f64::to_string).collect();
         if !coarse.is_empty() {
             session.warn(format!(
-                "lattice parameters {} mm exceed half the mean strut thickness ({thickness:.3} mm): E_app is far from converged there",
-                coarse.join(", ")
+                "lattice parameters {} mm exceed half the mean strut thickness ({:.3} mm): E_app is far from converged there",
+                coarse.join(", "),
+                0.5 * thickness
             ));
         }
     }

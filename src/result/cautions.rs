@@ -74,8 +74,9 @@ fn coarse(row: &Row) -> Option<String> {
     let thickness = row.marks.mean_thickness_mm.filter(|_| plain)?;
     (row.key.lp_mm > 0.5 * thickness).then(|| {
         format!(
-            "the lattice parameter of {} mm exceeds half the mean strut thickness ({thickness:.3} mm): E_app is far from converged there",
-            row.key.lp_mm
+            "the lattice parameter of {} mm exceeds half the mean strut thickness ({:.3} mm): E_app is far from converged there",
+            row.key.lp_mm,
+            0.5 * thickness
         )
     })
 }

@@ -46,9 +46,13 @@ fn checked(mut mean: Row, parts: [&Row; 2], known: &[Row]) -> Row {
     mean
 }
 
+/// Modulus over the tissue's below which a lattice only turns and shifts: a mechanism.
+const MECHANISM: f64 = 1e-9;
+
 /// Whether one of the two carries no load and the other does: half of the other is no estimate.
 fn only_one_carries(a: &Row, b: &Row) -> bool {
-    a.carries_nothing() != b.carries_nothing()
+    let carries = |row: &Row| row.e_app_mpa() > Some(MECHANISM * row.key.young_mpa);
+    carries(a) != carries(b)
 }
 
 /// Moduli are means, sites and times are sums, it is converged where both are; the rest is missing.

@@ -72,6 +72,18 @@ impl Tissue {
         Ok(tissue_of(bone, young, kind, poissons))
     }
 
+    /// Largest modulus over the smallest, of the voxels of `bone`.
+    pub fn contrast(&self, bone: &[u8]) -> f64 {
+        let Tissue::Mixed(mixed) = self else {
+            return 1.0;
+        };
+        let factors = bone.iter().zip(&mixed.factor).filter(|(b, _)| **b != 0);
+        let (least, most) = factors.fold((f32::INFINITY, 0.0f32), |(least, most), (_, &f)| {
+            (least.min(f), most.max(f))
+        });
+        f64::from(most / least)
+    }
+
     /// Mean modulus over the bone.
     pub fn mean_mpa(&self) -> f64 {
         match self {

@@ -2,6 +2,7 @@
 
 use crate::result::answer::AnswerLine;
 use crate::result::cautions::WARNING;
+use crate::result::notes;
 use crate::result::row::Row;
 use crate::result::settings::BoundaryRule;
 
@@ -46,10 +47,8 @@ fn modulus(row: &Row) -> String {
 }
 
 fn note(row: &Row) -> String {
-    let parts = row.marks.note.as_deref().unwrap_or_default().split("; ");
-    let kept: Vec<&str> = parts
-        .filter(|p| !p.is_empty() && !p.starts_with(WARNING))
-        .collect();
+    let parts = notes::parts(row.marks.note.as_deref());
+    let kept: Vec<&str> = parts.filter(|p| !p.starts_with(WARNING)).collect();
     match kept.is_empty() {
         true => String::new(),
         false => format!("  ({})", kept.join("; ")),

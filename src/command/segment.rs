@@ -45,22 +45,13 @@ pub fn segment(
         results::set_aside_stale(dir, session);
         return Ok(kept);
     }
-    let Whole {
-        scan,
-        voi_mask,
-        hidden,
-    } = read(input, name, params, session)?;
-    let mut segmented = stage::segment_measured(
-        &scan.name,
-        &scan.volume,
-        params,
-        voi_mask.as_ref(),
-        hidden.as_ref(),
-    )?;
+    let whole = read(input, name, params, session)?;
+    let scan = &whole.scan;
+    let mut segmented = whole.segmented(params)?;
     let warnings = &mut segmented.summary.warnings;
     warnings.extend(scan.warnings.iter().cloned());
-    warnings.extend(threshold_in_counts(&scan, params));
-    warnings.extend(values_out_of_unit(&scan, params));
+    warnings.extend(threshold_in_counts(scan, params));
+    warnings.extend(values_out_of_unit(scan, params));
     let record = SegmentRecord {
         program: env!("CARGO_PKG_NAME").into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -71,7 +62,7 @@ pub fn segment(
             voi_blake3,
             format: scan.format.clone(),
             unit: scan.unit.clone(),
-            axes: axes(&scan, params),
+            axes: axes(scan, params),
             notes: scan.notes.clone(),
         },
         settings: params.clone(),
@@ -108,23 +99,13 @@ pub fn in_memory(
     params: &SegmentParams,
     session: &Session,
 ) -> Result<Specimen> {
-    let Whole {
-        scan,
-        voi_mask,
-        hidden,
-    } = read(input, name, params, session)?;
+    let whole = read(input, name, params, session)?;
+    let scan = &whole.scan;
     let warnings = scan.warnings.iter().cloned();
     warnings
-        .chain(threshold_in_counts(&scan, params))
+        .chain(threshold_in_counts(scan, params))
         .for_each(|warning| session.warn_of(Some(&scan.name), warning));
-    let segmented = stage::segment_measured(
-        &scan.name,
-        &scan.volume,
-        params,
-        voi_mask.as_ref(),
-        hidden.as_ref(),
-    )?;
-    Ok(segmented.specimen)
+    Ok(whole.segmented(params)?.specimen)
 }
 
 /// A scan that was read, and what goes with it.
@@ -134,6 +115,18 @@ struct Whole {
     voi_mask: Option<Volume<u8>>,
     /// Voxels that are no measurement, which are NaN in the scan now.
     hidden: Option<Hidden>,
+}
+
+impl Whole {
+    fn segmented(&self, params: &SegmentParams) -> Result<stage::Segmented<'_>> {
+        stage::segment_measured(
+            &self.scan.name,
+            &self.scan.volume,
+            params,
+            self.voi_mask.as_ref(),
+            self.hidden.as_ref(),
+        )
+    }
 }
 
 fn read(

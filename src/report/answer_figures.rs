@@ -3,6 +3,7 @@
 use super::distinct;
 use super::figure::{Axis, Content, Curve, Figure, GroupOfPoints, Mark, Point};
 use crate::report::answers::{Answers, comparable};
+use crate::report::groups::subject_means;
 use crate::result::answer::AnswerLine;
 use crate::result::statistics::regression::regression;
 use crate::result::statistics::summary::summary;
@@ -51,7 +52,7 @@ fn by_group(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
         return None;
     }
     let points = groups.iter().enumerate().map(|(hue, group)| {
-        let values = of_subjects(&of(kept, Some(group)));
+        let values = subject_means(&of(kept, Some(group)), |a| a.e_app_mpa);
         GroupOfPoints {
             label: format!("{group} (n = {})", values.len()),
             hue,
@@ -76,18 +77,6 @@ fn by_group(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
         content: Content::Groups(points.collect()),
         ..Figure::default()
     })
-}
-
-/// The modulus of each subject, the mean of its scans.
-fn of_subjects(own: &[&AnswerLine]) -> Vec<f64> {
-    let subject = |a: &AnswerLine| a.subject.clone().unwrap_or_else(|| a.scan.clone());
-    let subjects = distinct(own.iter().map(|a| subject(a)));
-    let mean = |name: String| {
-        let of_one = own.iter().filter(|a| subject(a) == name);
-        let moduli: Vec<f64> = of_one.filter_map(|a| a.e_app_mpa).collect();
-        summary(&moduli).map(|s| s.mean)
-    };
-    subjects.into_iter().filter_map(mean).collect()
 }
 
 /// None for fewer than two scans.

@@ -134,23 +134,11 @@ fn of_quantity<'a>(answers: &[&'a AnswerLine], quantity: &Quantity) -> Vec<Group
             .into_iter()
             .filter(|a| (quantity.value)(a).is_some())
             .collect();
-        let subjects = distinct(own.iter().map(|a| subject(a)));
-        let members = subjects.into_iter().map(|subject_name| {
-            let values: Vec<f64> = own
-                .iter()
-                .filter(|a| subject(a) == subject_name)
-                .filter_map(|a| (quantity.value)(a))
-                .collect();
-            Member {
-                subject: subject_name.to_owned(),
-                value: values.iter().sum::<f64>() / values.len() as f64,
-            }
-        });
         let errors: Option<Vec<f64>> = own.iter().map(|a| (quantity.error)(a)).collect();
         Group {
             name,
             scans: own.len(),
-            members: members.collect(),
+            members: members(&own, quantity.value),
             mean_error: errors
                 .filter(|e| !e.is_empty())
                 .map(|e| e.iter().sum::<f64>() / e.len() as f64),
@@ -167,6 +155,28 @@ fn of_quantity<'a>(answers: &[&'a AnswerLine], quantity: &Quantity) -> Vec<Group
             .collect(),
     };
     all.into_iter().filter(|g| !g.members.is_empty()).collect()
+}
+
+/// The subjects of scans that have the value.
+fn members(own: &[&AnswerLine], value: fn(&AnswerLine) -> Option<f64>) -> Vec<Member> {
+    let member = |name: &str| {
+        let of_one = own.iter().filter(|a| subject(a) == name);
+        let values: Vec<f64> = of_one.filter_map(|a| value(a)).collect();
+        Member {
+            subject: name.to_owned(),
+            value: values.iter().sum::<f64>() / values.len() as f64,
+        }
+    };
+    let subjects = distinct(own.iter().map(|a| subject(a)));
+    subjects.into_iter().map(member).collect()
+}
+
+/// The value of each subject, the mean of its scans, which all have it.
+pub(super) fn subject_means(
+    own: &[&AnswerLine],
+    value: fn(&AnswerLine) -> Option<f64>,
+) -> Vec<f64> {
+    members(own, value).iter().map(|m| m.value).collect()
 }
 
 /// Scans without a subject are subjects of their own.

@@ -17,7 +17,7 @@ pub mod statistics;
 pub mod table;
 
 use crate::result::cautions::WARNING;
-use crate::result::notes::{Alike, Alikes};
+use crate::result::notes::{Alike, Alikes, parts};
 use crate::result::row::Row;
 use crate::result::settings::{BoundaryRule, Elements, Method};
 use answers::Answers;
@@ -107,24 +107,22 @@ const SERIOUS: [&str; 6] = [
 /// Warnings of the answers' notes and of all rows, one line a matter, with the scans that they are of.
 fn warnings(rows: &[Row], answers: &Answers) -> Vec<String> {
     let mut found = Alikes::default();
-    let mut add = |note: Option<&str>, scan: &str| {
-        let parts = note.unwrap_or_default().split("; ");
-        for part in parts.filter(|p| SERIOUS.iter().any(|s| p.starts_with(s))) {
+    let mut add = |part: &str, scan: &str| {
+        if SERIOUS.iter().any(|s| part.starts_with(s)) {
             found.add(part.strip_prefix(WARNING).unwrap_or(part), scan);
         }
     };
     for line in &answers.lines {
-        add(line.note.as_deref(), &line.scan);
+        parts(line.note.as_deref()).for_each(|part| add(part, &line.scan));
     }
     // Cautions of rows that are no answer stand with those rows.
     for row in rows {
         let note = row.marks.note.as_deref();
-        let parts = note.unwrap_or_default().split("; ");
-        for part in parts.filter(|p| !p.starts_with(WARNING)) {
-            add(Some(part), &row.key.scan);
-        }
+        parts(note)
+            .filter(|part| !part.starts_with(WARNING))
+            .for_each(|part| add(part, &row.key.scan));
         if row.converged() == Some(false) && note.is_none() {
-            add(Some("not converged"), &row.key.scan);
+            add("not converged", &row.key.scan);
         }
     }
     let all = answers.lines.len();

@@ -176,10 +176,10 @@ pub fn answers(
             .collect();
         let mut answer = line(best(own.iter().copied())?, &facts(scan));
         if answer.e_app_mpa == Some(0.0) {
-            let said = own.iter().filter_map(|r| r.marks.note.as_deref());
-            let why = said
-                .flat_map(|note| note.split("; "))
-                .find(|part| part.starts_with(NO_PATH));
+            let mut said = own
+                .iter()
+                .flat_map(|r| notes::parts(r.marks.note.as_deref()));
+            let why = said.find(|part| part.starts_with(NO_PATH));
             if let Some(why) = why {
                 notes::add(&mut answer.note, why);
             }

@@ -135,10 +135,8 @@ fn note(a: &Row, b: &Row) -> Option<String> {
             "no mean: one of its lattices carries no load, and half of the other is no estimate",
         );
     }
-    let all = parts().filter_map(|row| row.marks.note.as_deref());
-    let warnings = all
-        .flat_map(|all| all.split("; "))
-        .filter(|n| n.starts_with(WARNING));
+    let all = parts().flat_map(|row| notes::parts(row.marks.note.as_deref()));
+    let warnings = all.filter(|n| n.starts_with(WARNING));
     warnings.for_each(|warning| notes::add(&mut note, warning));
     note
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// What divides the notes of one cell.
-pub const BETWEEN: &str = "; ";
+const BETWEEN: &str = "; ";
 
 /// In the note of a model that carries no load although the bone does.
 pub const NO_ANSWER: &str = "its E_app of 0 says nothing of the bone";
@@ -15,6 +15,12 @@ pub fn add(cell: &mut Option<String>, note: &str) {
         Some(all) => *all = format!("{all}{BETWEEN}{note}"),
         None => *cell = Some(note.to_owned()),
     }
+}
+
+/// The notes of a cell.
+pub fn parts(cell: Option<&str>) -> impl Iterator<Item = &str> {
+    let notes = cell.unwrap_or_default().split(BETWEEN);
+    notes.filter(|note| !note.is_empty())
 }
 
 /// A note without its numbers: notes that differ in numbers only say the same.

@@ -79,8 +79,7 @@ pub fn state_no_error(row: &mut Row, why: &str) {
 pub fn warnings(rows: &[Row]) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for row in rows {
-        let note = row.marks.note.as_deref().unwrap_or_default();
-        let parts = note.split(notes::BETWEEN);
+        let parts = notes::parts(row.marks.note.as_deref());
         let why = parts.filter_map(|part| part.strip_prefix(WARNING)?.strip_prefix(NO_ERROR));
         for why in why {
             let method = row.key.boundary.map_or("", BoundaryRule::name);

@@ -12,7 +12,7 @@ fn main() -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::NotConverged) => {
             put(
-                "warning: not converged, or the error asked for not met: results are written, the rows say so",
+                "warning: a solve did not converge or did not reach the error target: its results are written, and its rows say so",
             );
             ExitCode::from(1)
         }

@@ -71,6 +71,13 @@ const FLAGS: [(&[&str], &str); 12] = [
     ),
 ];
 
+/// What clap guesses from the spelling of a word.
+pub const GUESSES: [ContextKind; 3] = [
+    ContextKind::Suggested,
+    ContextKind::SuggestedArg,
+    ContextKind::TrailingArg,
+];
+
 /// A line more on how words could not be understood; None where clap says it all.
 pub fn hint(error: &clap::Error) -> Option<String> {
     let context = |kind| match error.get(kind) {

@@ -5,8 +5,8 @@ mod completions;
 mod hints;
 mod info;
 mod lattice;
+mod man;
 mod phantom;
-mod phantom_body;
 mod recipe;
 mod report;
 mod run;
@@ -89,12 +89,13 @@ enum Verb {
     Recipe(recipe::RecipeArgs),
     Columns(columns::ColumnsArgs),
     Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
 }
 
 /// Parses the words and carries out the command. Bad usage ends the process here with clap's message, a hint where there is
 /// one, and exit code 2.
 pub fn run() -> Result<Outcome> {
-    let cli = Cli::try_parse().unwrap_or_else(|error| refuse(&error));
+    let cli = Cli::try_parse().unwrap_or_else(|error| refuse(error));
     if cli.verb.keeps_what_it_finished() {
         bonepd_ct::machine::interrupt::say_how_to_go_on();
     }
@@ -112,14 +113,22 @@ pub fn run() -> Result<Outcome> {
         Verb::Recipe(args) => recipe::run(args),
         Verb::Columns(args) => columns::run(args, json),
         Verb::Completions(args) => completions::run(args),
+        Verb::Man(args) => man::run(args),
     }
 }
 
-/// Prints what clap says, help and version among it, and ends the process.
-fn refuse(error: &clap::Error) -> ! {
+/// Prints what clap says, help and version among it, and ends the process. Where there is a hint, it stands instead of what
+/// clap guesses from the spelling.
+fn refuse(mut error: clap::Error) -> ! {
     use std::io::Write;
+    let hint = hints::hint(&error);
+    if hint.is_some() {
+        for kind in hints::GUESSES {
+            error.remove(kind);
+        }
+    }
     let _ = error.print();
-    if let Some(words) = hints::hint(error) {
+    if let Some(words) = hint {
         let _ = writeln!(std::io::stderr(), "\nhint: {words}");
     }
     std::process::exit(error.exit_code())

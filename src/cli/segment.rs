@@ -30,7 +30,7 @@ pub struct SegmentArgs {
 #[command(next_help_heading = "Segmentation")]
 pub struct SegmentSettings {
     /// Voxel size in mm, one number or one per axis; overrides the file's. The axes are x, y, z as `info` prints them: those of
-    /// the patient or the world where the file tells how it lies in it, else as stored
+    /// the patient or the world where the file says how it lies in it, else as stored
     #[arg(long, value_name = "MM[,MM,MM]", value_parser = words::sizes)]
     spacing: Option<[f64; 3]>,
     /// What is in a file of voxels without a header (.raw, .vol), as 512,512,300,uint16; add `be` for big-endian numbers

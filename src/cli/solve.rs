@@ -79,7 +79,7 @@ pub struct SolveSettings {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     coarsen: Option<u16>,
     /// What becomes of N³ voxels: threshold (bone where at least half of them is), or fraction (the modulus times the bone
-    /// fraction) [default: threshold]
+    /// fraction; less than 2 % bone is left out) [default: threshold]
     #[arg(long, value_name = "RULE", value_parser = words::choice::<CoarsenBy>(&["threshold", "fraction"]), requires = "coarsen")]
     coarsen_by: Option<CoarsenBy>,
     /// Count zero-energy modes (direct factorisation; small models only)

@@ -212,9 +212,9 @@ fn job<'a>(
     })
 }
 
-/// A number in the spelling of the file: with a decimal comma beside semicolons and tabs.
+/// A number in the spelling of the file: with a decimal comma where columns are separated by semicolons or tabs.
 fn parsed(word: &str, column: &str, delimiter: u8) -> std::result::Result<f64, String> {
-    // 1.200 beside semicolons is 1200 in the countries that save so, and 1.2 in all others.
+    // 1.200 between semicolons is 1200 in the countries that save so, and 1.2 in all others.
     let (head, tail) = word.split_once('.').unwrap_or((word, ""));
     let digits = |text: &str| text.bytes().all(|c| c.is_ascii_digit());
     let head = head.trim_start_matches(['-', '+']);
@@ -226,7 +226,7 @@ fn parsed(word: &str, column: &str, delimiter: u8) -> std::result::Result<f64, S
         && !head.is_empty()
     {
         return Err(format!(
-            "`{word}` in `{column}` may mean {head}{tail} or {head}.{}: beside semicolons a point can divide thousands. Write it without one, or with a decimal comma",
+            "`{word}` in `{column}` may mean {head}{tail} or {head}.{}: between semicolons a point can divide thousands. Write it without one, or with a decimal comma",
             tail.trim_end_matches('0')
         ));
     }

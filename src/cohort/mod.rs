@@ -184,14 +184,14 @@ impl Run<'_> {
         Ok(rows)
     }
 
-    /// The recipe as it is run. One of an earlier run that differs is kept beside it.
+    /// The recipe as it is run. One of an earlier run that differs is kept too.
     fn write_recipe(&self) -> Result<String> {
         let recipe = toml::to_string(self.recipe).expect("settings are plain data");
         let file = self.out.join(report::RECIPE);
         if std::fs::read_to_string(&file).is_ok_and(|old| old != recipe) {
             let _ = std::fs::rename(&file, self.out.join(report::OLD_RECIPE));
             self.session.say(format!(
-                "note: an earlier run in {} had another recipe: its rows are kept beside the new ones, the recipe is {}",
+                "note: an earlier run in {} had another recipe: its rows are kept with the new ones, its recipe is {}",
                 self.out.display(),
                 report::OLD_RECIPE
             ));

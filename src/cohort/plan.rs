@@ -2,7 +2,7 @@
 
 use crate::cohort::job::ScanJob;
 use crate::cohort::outcome::{ScanResult, result};
-use crate::command::estimate::{Estimate, of_specimen};
+use crate::command::estimate::{Estimate, of_specimen, time_in_words};
 use crate::command::segment;
 use crate::machine::host;
 use crate::machine::session::Session;
@@ -55,12 +55,7 @@ pub(super) fn plan(
     bar.finish_and_clear();
     let estimates: Vec<Estimate> = results.iter().map(|r| r.estimate).collect();
     let seconds = estimates.iter().filter_map(|e| e.time_s).sum::<f64>();
-    let time = match seconds {
-        s if s < 1.0 => "less than 1 s".to_owned(),
-        s if s < 90.0 => format!("{s:.0} s"),
-        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
-    };
+    let time = time_in_words(seconds);
     let unknown = estimates.iter().filter(|e| e.time_s.is_none()).count();
     let rest = match unknown {
         0 => String::new(),

@@ -119,7 +119,7 @@ fn is_scan(file: &Path) -> bool {
     scan::is_scan_file(file) && !own_files::is_result(file)
 }
 
-/// A folder of results with no scan beside them.
+/// A folder of results with no scan next to them.
 fn refuse_results(input: &Path) -> Result<()> {
     let has_scans = || listing(input).is_ok_and(|files| files.iter().any(|f| is_scan(f)));
     match input.is_dir() && holds_results(input) && !has_scans() {
@@ -139,7 +139,7 @@ fn scans_under(
     session: &Session,
 ) -> Result<Vec<(String, PathBuf)>> {
     let is_scan = is_one_scan(input);
-    // Results may lie beside the scans they are of.
+    // Results may lie next to the scans they are of.
     if is_scan || input.join(specimen::RECORD).is_file() {
         refuse_results(input)?;
     }
@@ -186,7 +186,7 @@ fn is_one_scan(folder: &Path) -> bool {
     !slices.is_empty() && !files.iter().any(|f| whole(&f)) && !extent::is_stack(slices[0])
 }
 
-/// Whether the pictures of a folder may be slices of one scan: of one size. Figures beside scans are of many.
+/// Whether the pictures of a folder may be slices of one scan: of one size. Figures next to scans are of many.
 fn are_slices(folder: &Path) -> bool {
     let Ok(files) = listing(folder) else {
         return true;
@@ -251,7 +251,7 @@ fn descend(
     Ok(())
 }
 
-/// Names become folders beside the run's own files.
+/// Names become folders next to the run's own files.
 fn refuse_names(jobs: &[ScanJob]) -> Result<()> {
     const OWN: [&str; 6] = [
         "report",

@@ -15,12 +15,13 @@ pub const COARSENED: [usize; 3] = [2, 3, 4];
 /// A stated error that one element a voxel can meet. Smaller targets climb on.
 const MET_BY_VOXELS: f64 = 0.15;
 
-/// What `--error` can be expected to solve last.
-pub fn expected(target: f64, params: &SolveParams) -> SolveParams {
-    match target >= MET_BY_VOXELS {
-        true => voxel_fe(params, 1, 1),
-        false => voxel_fe(params, 1, REFINED[0]),
+/// What `--error` can be expected to solve, the largest model last.
+pub fn expected(target: f64, params: &SolveParams) -> Vec<SolveParams> {
+    let mut steps = vec![voxel_fe(params, 1, 1)];
+    if target < MET_BY_VOXELS {
+        steps.extend([smoothed_again(params), voxel_fe(params, 1, REFINED[0])]);
     }
+    steps
 }
 
 pub fn voxel_fe(params: &SolveParams, coarsen: usize, refine: usize) -> SolveParams {

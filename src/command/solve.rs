@@ -249,6 +249,7 @@ impl OpenScan {
             1000,
             &format!("{} {} mm", name(&blank.key), blank.key.lp_mm),
         );
+        bar.set_message("building the model and its multigrid");
         let loads = if params.load == Load::Stiffness { 6 } else { 1 };
         let solution = job.solve(prepared, params, &mut |load, step| {
             show(&bar, [load, loads], step, params.tolerance);

@@ -1,4 +1,4 @@
-//! Owns what can be told of a scan without reading its voxels: its extent, and whether a TIFF file is a whole stack.
+//! Owns what can be said of a scan without reading its voxels: its extent, and whether a TIFF file is a whole stack.
 
 use crate::image::tiff::directories;
 use crate::image::{nifti, slices};
@@ -16,7 +16,7 @@ pub struct Extent {
     pub spacing_mm: Option<[f64; 3]>,
 }
 
-/// None where a header does not tell cheaply; reading the scan says what is wrong.
+/// None where a header does not say it cheaply; reading the scan says what is wrong.
 pub fn of(path: &Path) -> Option<Extent> {
     if path.is_dir() {
         let files = slices::files(path).ok()?;
@@ -47,7 +47,7 @@ pub fn is_stack(path: &Path) -> bool {
     pages(path).is_some_and(|[_, _, pages]| pages > 1)
 }
 
-/// Width, height, and pages of a TIFF file; an ImageJ stack of one directory tells its pages in its description.
+/// Width, height, and pages of a TIFF file; an ImageJ stack of one directory gives its pages in its description.
 fn pages(path: &Path) -> Option<[usize; 3]> {
     let mut file = File::open(path).ok()?;
     let bytes = file.metadata().ok()?.len();

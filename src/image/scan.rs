@@ -140,7 +140,7 @@ fn calibrate(stored: &mut Stored, unit: GreyUnit, path: &Path) -> Result<()> {
                 path,
                 format!(
                     "holds no calibration to {asked} (its unit: {})",
-                    found.unwrap_or("not told")
+                    found.unwrap_or("not given")
                 ),
                 "use --units native, with a threshold in the file's own values",
             )),
@@ -288,7 +288,7 @@ fn without_vms_version(name: &str) -> &str {
 }
 
 /// True for what [`read`] takes as one file (by its name; the content may still be refused). Of a pair it is the header. Voxels
-/// without a header are none: most lie beside the header of another format.
+/// without a header are none: most belong to the header of another format.
 pub fn is_scan_file(path: &Path) -> bool {
     path.is_file()
         && kind(path).is_some_and(|kind| kind != Kind::Headerless)
@@ -371,7 +371,7 @@ pub fn hash(path: &Path) -> Result<String> {
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// The files of voxels that a header beside them names.
+/// The files of voxels that a header in their folder names.
 fn data_files(path: &Path) -> Vec<PathBuf> {
     match kind(path) {
         Some(Kind::MetaImage) => metaimage::data_files(path),

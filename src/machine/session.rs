@@ -29,7 +29,7 @@ pub struct Session {
     pub output: Output,
 }
 
-/// Where words go beside the terminal.
+/// Where words go other than the terminal.
 #[derive(Debug, Clone, Default)]
 pub struct Output {
     /// All bars of a run share the terminal.

@@ -1,5 +1,7 @@
 //! Owns the data dictionary: what each column of the result files means, and its unit.
 
+mod groups;
+
 use serde::Serialize;
 
 #[derive(Debug, Serialize)]
@@ -22,7 +24,7 @@ const fn column(name: &'static str, unit: &'static str, about: &'static str) -> 
 }
 
 /// All files, in the order in which readers meet them.
-pub const FILES: [File; 4] = [
+pub const FILES: [File; 7] = [
     File {
         name: "answers.csv",
         about: "one row a scan: its apparent modulus with all of its stated error, by the row of the least stated error",
@@ -32,6 +34,21 @@ pub const FILES: [File; 4] = [
         name: "results.csv",
         about: "one row a solve, and rows that follow from several solves (boundary ffb, extrapolated)",
         columns: &RESULTS,
+    },
+    File {
+        name: "groups.csv",
+        about: "one row a quantity and group (in the report's folder)",
+        columns: &groups::GROUPS,
+    },
+    File {
+        name: "comparisons.csv",
+        about: "one row a quantity and pair of groups (in the report's folder)",
+        columns: &groups::COMPARISONS,
+    },
+    File {
+        name: "stiffness.csv",
+        about: "one row a scan whose stiffness was computed (in the report's folder; the tensor itself is in stiffness.json)",
+        columns: &groups::STIFFNESS,
     },
     File {
         name: "failed.csv",
@@ -289,6 +306,8 @@ mod tests {
     use super::*;
     use crate::io::table::to_csv;
     use crate::record::failures::Failure;
+    use crate::record::stiffness::StiffnessLine;
+    use crate::report::groups::{ComparisonLine, GroupLine};
     use crate::result::answer::AnswerLine;
     use crate::result::row::Row;
     use std::collections::BTreeSet;
@@ -300,6 +319,9 @@ mod tests {
             ("results.csv", to_csv::<Row>(&[])),
             ("answers.csv", to_csv::<AnswerLine>(&[])),
             ("failed.csv", to_csv::<Failure>(&[])),
+            ("groups.csv", to_csv::<GroupLine>(&[])),
+            ("comparisons.csv", to_csv::<ComparisonLine>(&[])),
+            ("stiffness.csv", to_csv::<StiffnessLine>(&[])),
         ] {
             let file = FILES.iter().find(|f| f.name == name).unwrap();
             let described: Vec<&str> = file.columns.iter().map(|c| c.name).collect();

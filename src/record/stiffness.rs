@@ -42,6 +42,49 @@ pub struct StiffnessRecord {
     pub orthotropic: Option<Orthotropic>,
 }
 
+/// One line of `stiffness.csv`: the orthotropic constants of a scan; None for a stiffness that is not positive definite.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct StiffnessLine {
+    pub scan: String,
+    pub conditions: String,
+    pub bv_tv: f64,
+    pub e1_mpa: Option<f64>,
+    pub e2_mpa: Option<f64>,
+    pub e3_mpa: Option<f64>,
+    pub g23_mpa: Option<f64>,
+    pub g13_mpa: Option<f64>,
+    pub g12_mpa: Option<f64>,
+    pub nu23: Option<f64>,
+    pub nu13: Option<f64>,
+    pub nu12: Option<f64>,
+    /// Share of the tensor that no orthotropic tensor holds.
+    pub not_orthotropic: Option<f64>,
+}
+
+impl StiffnessLine {
+    pub fn of(record: &StiffnessRecord) -> StiffnessLine {
+        let constants = record.orthotropic.as_ref();
+        let [e1, e2, e3] = [0, 1, 2].map(|i| constants.map(|o| o.young_mpa[i]));
+        let [g23, g13, g12] = [0, 1, 2].map(|i| constants.map(|o| o.shear_mpa[i]));
+        let [nu23, nu13, nu12] = [0, 1, 2].map(|i| constants.map(|o| o.poisson[i]));
+        StiffnessLine {
+            scan: record.scan.clone(),
+            conditions: record.boundary_conditions.clone(),
+            bv_tv: record.bv_tv,
+            e1_mpa: e1,
+            e2_mpa: e2,
+            e3_mpa: e3,
+            g23_mpa: g23,
+            g13_mpa: g13,
+            g12_mpa: g12,
+            nu23,
+            nu13,
+            nu12,
+            not_orthotropic: constants.map(|o| o.residual),
+        }
+    }
+}
+
 impl StiffnessRecord {
     pub fn voigt_order() -> [String; 6] {
         ["11", "22", "33", "23", "13", "12"].map(str::to_owned)

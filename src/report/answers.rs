@@ -116,7 +116,7 @@ pub fn table(answers: &Answers) -> Table {
         "scan",
         "E_app ± error (MPa)",
         "error (%)",
-        "error asked for",
+        "error target",
         "group",
         "subject",
         "BV/TV",

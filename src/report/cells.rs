@@ -64,14 +64,21 @@ pub fn records<T: Serialize>(records: &[T]) -> Table {
     let head = rows.first().map_or(Vec::new(), |row| {
         row.keys().map(|key| head_of(key)).collect()
     });
-    let cell = |value: &serde_json::Value| match (value.as_u64(), value.as_f64(), value.as_str()) {
+    let is_p = |key: &str| key.starts_with("p_") || key.ends_with("_p");
+    let cell = |key: &str, value: &serde_json::Value| match (
+        value.as_u64(),
+        value.as_f64(),
+        value.as_str(),
+    ) {
         (Some(n), _, _) => count(n),
+        (_, v, None) if is_p(key) => p_value(v),
         (_, Some(v), _) => number(Some(v)),
-        (_, _, word) => text(word.unwrap_or("")),
+        (_, _, Some(word)) => text(word),
+        (_, None, None) => number(None),
     };
     let body = rows
         .iter()
-        .map(|row| row.values().map(cell).collect())
+        .map(|row| row.iter().map(|(key, value)| cell(key, value)).collect())
         .collect();
     Table { head, body }.without_empty_columns()
 }

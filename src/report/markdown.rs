@@ -1,12 +1,13 @@
 //! Owns the report as Markdown: the tables of the page, the figures by file name, the notes.
 
-use crate::report::cells::digits;
+use crate::report::cells::records;
 use crate::report::figure::Figure;
-use crate::report::statistics::{AgreementLine, RegressionLine, Statistics};
+use crate::report::html::ScanPage;
+use crate::report::statistics::Statistics;
 use crate::report::{Report, answers, group_tables, html};
 
-/// The report's text, with the tables of the page. Figures are `STEM.svg` beside it.
-pub fn render(report: &Report) -> String {
+/// The report's text, with the tables of the page. Figures are `STEM.svg` in the same folder.
+pub fn render(report: &Report, pages: &[ScanPage]) -> String {
     let list =
         |lines: &[String]| -> String { lines.iter().map(|line| format!("- {line}\n")).collect() };
     let mut text = format!("# {}\n\n## Answers\n\n", report.title);
@@ -25,6 +26,7 @@ pub fn render(report: &Report) -> String {
         let table = group_tables::comparisons_table(&report.groups);
         text += &format!("\n{}\n{}\n", table.markdown(), group_tables::ON_ERRORS);
     }
+    text += &stiffness_text(pages);
     text += &format!("\n## All solves\n\n{}", html::solves(report).markdown());
     if !report.method_notes.is_empty() {
         text += &format!("\n{}", list(&report.method_notes));
@@ -40,39 +42,33 @@ pub fn render(report: &Report) -> String {
     text
 }
 
-/// Regressions and agreements; empty for fewer than three scans.
+/// The orthotropic constants of the scans that have a stiffness.
+fn stiffness_text(pages: &[ScanPage]) -> String {
+    let of = |page: &ScanPage| {
+        let shown = page.stiffness.as_ref()?;
+        let (conditions, constants) = (&shown.conditions, shown.constants.markdown());
+        Some(format!("\n### {}\n\n{conditions}.\n\n{}\n{constants}", page.scan, shown.matrix.markdown()))
+    };
+    let all: Vec<String> = pages.iter().filter_map(of).collect();
+    match all.is_empty() {
+        true => String::new(),
+        false => format!("\n## Apparent stiffness\n{}", all.concat()),
+    }
+}
+
+/// Regressions and agreements, as on the page; empty for fewer than three scans.
 fn statistics_text(statistics: &Statistics) -> String {
-    if statistics.regressions.is_empty() {
-        return String::new();
+    let tables = [
+        records(&statistics.regressions),
+        records(&statistics.agreements),
+        records(&statistics.boxes),
+    ];
+    let shown = tables.iter().filter(|table| !table.body.is_empty());
+    let text: String = shown.map(|table| format!("\n{}", table.markdown())).collect();
+    match text.is_empty() {
+        true => text,
+        false => format!("\n## Statistics of methods\n{text}"),
     }
-    let mut text = "\n## Statistics of methods\n\n| y | x | n | slope | intercept | R² | p of slope |\n| --- | --- | --- | --- | --- | --- | --- |\n".to_owned();
-    for RegressionLine { y, x, fit } in &statistics.regressions {
-        let numbers = [fit.slope, fit.intercept, fit.r2].map(|v| digits(Some(v)));
-        text += &format!(
-            "| {y} | {x} | {} | {} | {:.2e} |\n",
-            fit.n,
-            numbers.join(" | "),
-            fit.slope_p
-        );
-    }
-    if !statistics.agreements.is_empty() {
-        text += "\n| method | reference | n | bias (MPa) | limits of agreement (MPa) | p of bias |\n| --- | --- | --- | --- | --- | --- |\n";
-    }
-    for AgreementLine {
-        method,
-        reference,
-        found,
-    } in &statistics.agreements
-    {
-        let [bias, low, high] =
-            [found.bias, found.lower_limit, found.upper_limit].map(|v| digits(Some(v)));
-        text += &format!(
-            "| {method} | {reference} | {} | {bias} | {low} to {high} | {} |\n",
-            found.n,
-            found.bias_p.map_or("NA".to_owned(), |p| format!("{p:.2e}"))
-        );
-    }
-    text
 }
 
 fn figure_text(figure: &Figure) -> String {

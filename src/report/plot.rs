@@ -262,7 +262,7 @@ fn markers(curve: &Curve, hue: &str) -> ScatterPlot {
 /// Half the width of a group's median, in places of the axis.
 const HALF: f64 = 0.28;
 
-/// Points side by side around the group's place, its median as a line, its mean with its interval beside them.
+/// Points side by side around the group's place, its median as a line, its mean with its interval to the right.
 fn group_plots(at: f64, group: &GroupOfPoints) -> Vec<Plot> {
     let hue = HUES[group.hue % HUES.len()];
     let n = group.values.len();

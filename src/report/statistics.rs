@@ -164,8 +164,8 @@ pub fn statistics(samples: &[Sample]) -> Statistics {
     }
 }
 
-/// The methods of an analysis of variance with their moduli of the scans that have them all. FFB is no method beside both
-/// its parts: a level that follows from others makes the covariance of levels singular.
+/// The methods of an analysis of variance with their moduli of the scans that have them all. FFB is left out where both
+/// its parts are in: a level that follows from others makes the covariance of levels singular.
 fn repeated(samples: &[Sample]) -> (Vec<String>, Vec<Vec<f64>>) {
     let mut levels: Vec<&Sample> = common(samples).collect();
     let all = levels.clone();

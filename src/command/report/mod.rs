@@ -16,6 +16,7 @@ use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
+use crate::record::stiffness::StiffnessLine;
 use crate::report::answers;
 use crate::report::answers::Answers;
 use crate::report::html;
@@ -106,14 +107,16 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
         format!("{}: failed, no results: {reason}", f.scan)
     });
     report.notes.splice(0..0, failed);
-    let mut files = render(&report, session)?;
+    let pages = pages(rows, dirs);
+    let mut files = render(&report, &pages, session)?;
+    files.extend(stiffness_table(&pages, dirs));
     let source = Source {
         recipe,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         date: host::date(),
         host: host::name(),
     };
-    let page = html::render(&report, &pages(rows, dirs), &source)?;
+    let page = html::render(&report, &pages, &source)?;
     files.push(("report.html".to_owned(), page.into_bytes()));
     let paths: Vec<PathBuf> = files.iter().map(|(name, _)| out.join(name)).collect();
     if session.dry_run {
@@ -133,10 +136,14 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
 }
 
 /// Name and content of every file of a report but the page.
-fn render(report: &Report, session: &Session) -> Result<Vec<(String, Vec<u8>)>> {
+fn render(
+    report: &Report,
+    pages: &[ScanPage],
+    session: &Session,
+) -> Result<Vec<(String, Vec<u8>)>> {
     let text = |name: &str, content: String| (name.to_owned(), content.into_bytes());
     let mut files = vec![
-        text("report.md", markdown::render(report)),
+        text("report.md", markdown::render(report, pages)),
         text(ANSWERS, table::to_csv(&report.answers.lines)),
         text("groups.csv", table::to_csv(&report.groups.lines)),
         text("comparisons.csv", table::to_csv(&report.groups.comparisons)),
@@ -230,6 +237,17 @@ fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
             .map(|record| self::stiffness::shown(&record)),
         files: files(&dir),
     }
+}
+
+/// `stiffness.csv`, where a scan has a stiffness.
+fn stiffness_table(pages: &[ScanPage], dirs: &[PathBuf]) -> Option<(String, Vec<u8>)> {
+    let of = |page: &ScanPage| {
+        let (dir, _) = folder(&page.scan, dirs)?;
+        let record = crate::record::stiffness::record(&dir.join(RECORD))?;
+        Some(StiffnessLine::of(&record))
+    };
+    let lines: Vec<StiffnessLine> = pages.iter().filter_map(of).collect();
+    (!lines.is_empty()).then(|| ("stiffness.csv".to_owned(), table::to_csv(&lines).into_bytes()))
 }
 
 /// Fields, curves and models that were asked for.

@@ -1,5 +1,5 @@
 //! Owns the removal of what an earlier scene left in a folder: fields and maps of times that the next one does not write
-//! would stay beside its own and be taken for them.
+//! would stay with its own and be taken for them.
 
 use super::differences::time_of;
 use crate::error::{Error, Result};

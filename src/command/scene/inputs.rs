@@ -96,7 +96,7 @@ impl Section {
         Err(Error::file(
             path,
             format!("its slice has {}, the mask's {}", words(grey), words(self)),
-            "give the scan the mask was made from, cropped alike",
+            "give the scan the mask was made from, cropped in the same way",
         ))
     }
 }
@@ -107,7 +107,7 @@ fn near(a: f64, b: f64) -> bool {
 
 fn read_section(path: &Path, slice: &Slice) -> Result<Section> {
     let (axis, index) = (slice.axis.index(), slice.index);
-    // A file that does not tell its voxel size will do: cells have that of the scene.
+    // A file that does not give its voxel size will do: cells have that of the scene.
     let (scan, sized) = match scan::read(path, None) {
         Ok(scan) => (scan, true),
         Err(_) => (scan::read(path, Some([1.0; 3]))?, false),

@@ -255,7 +255,7 @@ fn check_end(source: &mut dyn Read, path: &Path) -> Result<()> {
         Err(e) => Err(Error::file(
             path,
             format!("its voxels were decompressed, but the stream is damaged: {e}"),
-            "some voxels may be wrong: copy or download the file again (`gzip -t` tells whether a .gz file is whole)",
+            "some voxels may be wrong: copy or download the file again (`gzip -t` checks whether a .gz file is whole)",
         )),
     }
 }

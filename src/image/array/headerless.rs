@@ -148,13 +148,13 @@ pub fn unknown(path: &Path) -> Error {
         Some(header) => Error::file(
             path,
             "holds voxels without a header",
-            format!("give the header beside it: {}", header.display()),
+            format!("give its header instead: {}", header.display()),
         ),
         None => Error::file(
             path,
             "holds voxels without a header: their number and type are not in the file",
             format!(
-                "give --raw NX,NY,NZ,TYPE (as --raw 512,512,300,uint16) and --spacing MM, or write a header {name}.mhd beside it"
+                "give --raw NX,NY,NZ,TYPE (as --raw 512,512,300,uint16) and --spacing MM, or write a header {name}.mhd in the same folder"
             ),
         ),
     }

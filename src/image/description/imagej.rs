@@ -9,7 +9,7 @@
 //! | images | read: refused where the pages are others |
 //! | channels | read: refused above 1 |
 //! | slices | read |
-//! | frames | read: refused above 1 beside several slices, else taken as slices with a note |
+//! | frames | read: refused above 1 where there are several slices, else taken as slices with a note |
 //! | hyperstack | harmless |
 //! | mode | harmless |
 //! | order | harmless: with one channel, one order is left |
@@ -101,7 +101,7 @@ impl ImageJ {
         }
         if let (None, Some(mm)) = (self.spacing, self.slice_mm()) {
             notes.push(format!(
-                "ImageJ's notes tell no distance of slices, which is how it writes 1 {} ({mm} mm)",
+                "ImageJ's notes give no distance of slices, which means 1 {} ({mm} mm)",
                 self.unit(2)
             ));
         }
@@ -119,7 +119,7 @@ impl ImageJ {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Grey {
     function: Function,
-    /// The unit of the calibrated values is HU. Other units are not told: they are free text.
+    /// The unit of the calibrated values is HU. Other units are not reported: they are free text.
     hounsfield: bool,
 }
 
@@ -248,14 +248,14 @@ mod tests {
 
     #[test]
     fn other_functions_are_told_and_not_applied() {
-        for (notes, told) in [
+        for (notes, words) in [
             ("cf=3\nc0=1\nc1=2\nvunit=HU\n", "cf=3"),
             ("cf=0\nc0=1\n", "cf=0"),
         ] {
             let (values, grey_of) = grey(notes, "uint8");
             assert_eq!(values, [-100.0, 0.0, 200.0]);
             assert_eq!(grey_of.unit(), None);
-            assert!(grey_of.notes()[0].contains(told), "{:?}", grey_of.notes());
+            assert!(grey_of.notes()[0].contains(words), "{:?}", grey_of.notes());
         }
         for none in ["", "cf=20\n", "c0=5\nc1=2\n"] {
             assert!(grey(none, "uint8").1.notes().is_empty());

@@ -1,4 +1,4 @@
-//! What programs write into the description of an image file: text that tells sizes and meaning of voxels.
+//! What programs write into the description of an image file: text that gives the size and the meaning of voxels.
 
 pub mod imagej;
 pub mod ome;

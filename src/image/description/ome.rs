@@ -9,7 +9,7 @@
 //! | SizeY | read: refused where the pages differ |
 //! | SizeZ | read |
 //! | SizeC | read: refused above 1 |
-//! | SizeT | read: refused above 1 beside several slices, else taken as slices with a note |
+//! | SizeT | read: refused above 1 where there are several slices, else taken as slices with a note |
 //! | DimensionOrder | harmless: with one channel, one order is left |
 //! | PhysicalSizeX | read |
 //! | PhysicalSizeXUnit | read: µm where it is missing; one that is no length is said |
@@ -17,9 +17,9 @@
 //! | PhysicalSizeYUnit | read |
 //! | PhysicalSizeZ | read |
 //! | PhysicalSizeZUnit | read |
-//! | Type | harmless: the pages' tags tell |
+//! | Type | harmless: the pages' tags say it |
 //! | SignificantBits | harmless |
-//! | BigEndian | harmless: the file tells |
+//! | BigEndian | harmless: the file says it |
 //! | Interleaved | harmless |
 //! | TimeIncrement | harmless |
 //! | TimeIncrementUnit | harmless |

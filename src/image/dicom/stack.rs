@@ -10,7 +10,7 @@ use crate::format::orient;
 ///
 /// # Errors
 /// Slices without an order; two at one place; distances that differ by more than their digits explain; slices that lie
-/// beside the normal (a tilted gantry).
+/// off the normal (a tilted gantry).
 pub fn sort(
     frames: &mut [Frame],
     images: &[Image],
@@ -76,10 +76,10 @@ fn straight(frames: &[Frame], normal: [f64; 3], images: &[Image]) -> Result<()> 
         let from = f.position_mm.unwrap_or(first);
         let away: [f64; 3] = std::array::from_fn(|r| from[r] - first[r]);
         let along = dot(away, normal);
-        let beside = (dot(away, away) - along * along).max(0.0).sqrt();
-        let angle_deg = beside.atan2(along).to_degrees();
+        let sideways = (dot(away, away) - along * along).max(0.0).sqrt();
+        let angle_deg = sideways.atan2(along).to_degrees();
         // Positions of slices a tenth of a degree off would drift less than their digits or a voxel in 500.
-        if beside > 2.0 * digit && angle_deg > orient::SMALLEST_ANGLE_DEG {
+        if sideways > 2.0 * digit && angle_deg > orient::SMALLEST_ANGLE_DEG {
             return Err(orient::sheared(&images[f.file].path, angle_deg));
         }
     }

@@ -32,7 +32,7 @@ pub fn write(out: &mut impl Write, parts: &[&[u8]]) -> Result<()> {
     out.write_all(&sum.amount().to_le_bytes())
 }
 
-/// Bytes from the middle of a block that tell whether it shrinks.
+/// Bytes from the middle of a block that show whether it shrinks.
 const PROBE: usize = 1 << 15;
 /// A block that keeps more than this share of its size is stored.
 const WORTHWHILE: f64 = 0.85;

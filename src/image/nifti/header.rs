@@ -179,7 +179,7 @@ fn first(f: &Fields, version: Version, pair: bool) -> Header {
     }
 }
 
-/// `nifti2.h`. The last four characters of its magic tell a file that was changed as text.
+/// `nifti2.h`. The last four characters of its magic show a file that was changed as text.
 fn second(f: &Fields, path: &Path) -> Result<Header> {
     let pair = match f.text(4, 4).as_str() {
         "n+2" => false,

@@ -106,7 +106,7 @@ pub fn read(path: &Path) -> Result<Stored> {
     })
 }
 
-/// Sizes and voxel size (mm) by the header alone; None where it does not tell.
+/// Sizes and voxel size (mm) by the header alone; None where it does not say.
 pub fn extent(path: &Path) -> Option<([usize; 3], Option<[f64; 3]>)> {
     let path = &header_of(path);
     let (mut source, ..) = raw::open(path).ok()?;

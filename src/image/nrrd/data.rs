@@ -42,7 +42,7 @@ pub fn read(header: &Header, layout: &Layout, path: &Path) -> Result<Vec<f32>> {
     Ok(parts.collect::<Result<Vec<_>>>()?.concat())
 }
 
-/// The files that a header names, beside it; none where the data follow it.
+/// The files that a header names, in its folder; none where the data follow it.
 pub fn files(header: &Header, path: &Path) -> Result<Vec<PathBuf>> {
     let Some(named) = header.get("datafile") else {
         return Ok(Vec::new());

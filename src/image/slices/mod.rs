@@ -245,7 +245,7 @@ fn size(
     [nx, ny, nz]: [usize; 3],
     notes: &mut Vec<String>,
 ) -> Option<[f64; 3]> {
-    if let Some(log) = skyscan::beside(folder, first_file, notes)
+    if let Some(log) = skyscan::log_of(folder, first_file, notes)
         && let Some(size) = log.spacing_mm(step, [nx, ny], notes)
     {
         if let Some(pixel) = first.pixel_mm

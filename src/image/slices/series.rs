@@ -20,7 +20,7 @@ struct Named {
 }
 
 /// Brings the files of a folder in the order of the one number that tells them apart. Other numbers may change along with it
-/// (a position beside the slice's number); upper and lower case do not matter.
+/// (a position next to the slice's number); upper and lower case do not matter.
 ///
 /// # Errors
 /// Names of several series, two files of one number, numbers that are missing.
@@ -114,7 +114,7 @@ fn several<'a>(folder: &Path, series: impl ExactSizeIterator<Item = &'a Vec<&'a 
             "holds slices of {count} series by their names: {}{more}",
             words.join(", ")
         ),
-        "keep one scan in a folder: one name, and numbers that tell the slices' order",
+        "keep one scan in a folder: one name, and numbers that give the slices' order",
     )
 }
 
@@ -126,7 +126,7 @@ fn missing(before: &Named, after: &Named, column: usize) -> Error {
             "follows {}: between the numbers {a} and {b} slices are missing",
             file_name(before)
         ),
-        "export the whole series; where slices were left out on purpose, number the rest anew and give --spacing",
+        "export the whole series; where slices were left out on purpose, renumber the rest and give --spacing",
     )
 }
 

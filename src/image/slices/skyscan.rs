@@ -1,6 +1,6 @@
-//! Owns the voxel size in the logs that SkyScan's NRecon leaves beside its slices.
+//! Owns the voxel size in the logs that SkyScan's NRecon writes next to its slices.
 //!
-//! A log has sections (`[Reconstruction]`) and lines `key=value`. The scanner's own log, of projections, lies beside the slices
+//! A log has sections (`[Reconstruction]`) and lines `key=value`. The scanner's own log, of projections, lies next to the slices
 //! at times, too: the reconstruction's counts. Keys, and what becomes of each; any other does not change what a voxel is. A
 //! test of the repository reads this table and tries every row.
 //!
@@ -36,7 +36,7 @@ pub struct Log {
 }
 
 /// The log that belongs to the slices of which `slice` is one, and what is to be said of the choice.
-pub fn beside(folder: &Path, slice: &Path, notes: &mut Vec<String>) -> Option<Log> {
+pub fn log_of(folder: &Path, slice: &Path, notes: &mut Vec<String>) -> Option<Log> {
     let mut logs: Vec<Log> = paths(folder).iter().filter_map(|p| read(p)).collect();
     let any = logs.iter().any(|log| log.reconstructed);
     logs.retain(|log| log.reconstructed == any && log.pixel_mm.is_some());
@@ -51,16 +51,16 @@ pub fn beside(folder: &Path, slice: &Path, notes: &mut Vec<String>) -> Option<Lo
     let same = |log: &Log| (log.pixel_mm, log.step) == (chosen.pixel_mm, chosen.step);
     if !logs.iter().all(same) {
         if !begins(&chosen) {
-            notes.push("the logs beside the slices tell several voxel sizes, and no log has the slices' name: none is taken".into());
+            notes.push("the logs next to the slices give several voxel sizes, and no log has the slices' name: none is used".into());
             return None;
         }
         notes.push(format!(
-            "several logs lie beside the slices: the voxel size is that of {}, which has their name",
+            "there are several logs next to the slices: the voxel size is that of {}, which has their name",
             chosen.name
         ));
     }
     if !any {
-        notes.push("the log beside the slices is of the scan, not of a reconstruction: its pixel size is that of the projections".into());
+        notes.push("the log next to the slices is of the scan, not of a reconstruction: its pixel size is that of the projections".into());
     }
     Some(chosen)
 }
@@ -137,7 +137,7 @@ impl Log {
         // Slices are numbered by their sections where some were left out, or one after the other.
         let step = logged.max(numbers as f64);
         notes.push(format!(
-            "voxel size {pixel} mm from the reconstruction log beside the slices ({})",
+            "voxel size {pixel} mm from the reconstruction log next to the slices ({})",
             self.name
         ));
         if step != 1.0 {
@@ -185,7 +185,7 @@ mod tests {
         let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
         let slice = dir.path().join("b_rec0001.bmp");
         let mut notes = Vec::new();
-        let mut pixel = || beside(dir.path(), &slice, &mut notes).and_then(|log| log.pixel_mm);
+        let mut pixel = || log_of(dir.path(), &slice, &mut notes).and_then(|log| log.pixel_mm);
         write("a.log", "[Acquisition]\nImage Pixel Size (um)=17.5\n");
         assert_eq!(pixel(), Some(0.0175));
         write("b_rec.log", RECONSTRUCTION);

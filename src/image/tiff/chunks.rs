@@ -8,7 +8,7 @@ use std::io::{Read, Seek, SeekFrom};
 #[derive(Debug)]
 pub enum Fault {
     Damaged(String),
-    /// Its pixels are colours, or grey values that cannot be had back.
+    /// Its pixels are colours, or grey values that cannot be restored.
     NotGrey(&'static str),
 }
 

@@ -1,4 +1,4 @@
-//! Owns the voxel size that a TIFF file's tags tell.
+//! Owns the voxel size in the tags of a TIFF file.
 //!
 //! Tags XResolution, YResolution and ResolutionUnit were made for printers. Resolutions that image programs write when nobody
 //! gave them a size are left out; any other is taken, with a note.
@@ -25,7 +25,7 @@ pub enum Resolution {
     None,
 }
 
-/// `described`: whether a program's notes in the description tell the unit.
+/// `described`: whether a program's notes in the description give the unit.
 pub fn resolution(pages: &mut Pages, described: bool) -> Resolution {
     let (Some(x), Some(y)) = (
         per_unit(pages, Tag::XResolution),

@@ -213,7 +213,7 @@ fn join(bone: &mut Volume<u8>, keep_all: bool) -> Option<(u64, u64)> {
     Some((components.voxels.len() as u64, removed))
 }
 
-/// Cuts both ends flat and joins anew: what hung on the ends has gone with them. Returns what was cut off in mm.
+/// Cuts both ends flat and finds the connected bone again: what was joined by the ends alone goes with them. Returns what was cut off in mm.
 fn cut(
     placed: &mut Placed,
     found: &mut Found,

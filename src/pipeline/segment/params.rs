@@ -79,7 +79,7 @@ pub struct SegmentParams {
     pub keep_all: bool,
     /// Kept for old recipes: values are kept anyway.
     pub keep_grey: bool,
-    /// Keep no grey values beside the mask.
+    /// Keep no grey values.
     pub no_grey: bool,
     /// σ of the scanner's blur in voxels, where it is known; without the smoothing.
     pub blur_voxels: Option<f64>,
@@ -124,7 +124,7 @@ impl SegmentParams {
                 && upper.is_none_or(|upper| upper >= low)
     }
 
-    /// Whether grey values are kept beside the mask.
+    /// Whether grey values are kept with the mask.
     pub fn keeps_grey(&self) -> bool {
         self.keep_grey || !self.no_grey
     }
@@ -162,9 +162,9 @@ impl SegmentParams {
             return refuse(
                 "segment.labels",
                 format!(
-                    "label {label} cannot be told from its neighbours: values are kept in single precision, which rounds integers from {MOST_LABEL} on"
+                    "label {label} cannot be told apart from its neighbours: values are kept in single precision, which rounds integers from {MOST_LABEL} on"
                 ),
-                "number the labels anew with smaller numbers",
+                "renumber the labels with smaller numbers",
             );
         }
         if let (Some(lower), Some(upper)) = (self.lower, self.upper)

@@ -252,7 +252,7 @@ fn crosses(segment: &[f64; 4], a: [f64; 2], b: [f64; 2]) -> bool {
 mod tests {
     use super::*;
 
-    /// Points on a crack are cut off from one of its sides only; bonds beside it or through its end stay.
+    /// Points on a crack are cut off from one of its sides only; bonds next to it or through its end stay.
     #[test]
     fn a_crack_through_points_parts_its_two_sides() {
         let crack = [-2.0, -2.0, 1.0, 1.0];

@@ -53,7 +53,7 @@ impl Crack {
     /// Positive in the crack, negative outside; never changes faster than the distance (mm).
     pub fn depth(&self, p: Vec3) -> f64 {
         let from = minus(p, self.centre);
-        let beside = self.half_width_mm - dot(self.normal, from).abs();
-        beside.min(self.front_mm - dot(self.grown, from))
+        let sideways = self.half_width_mm - dot(self.normal, from).abs();
+        sideways.min(self.front_mm - dot(self.grown, from))
     }
 }

@@ -1,7 +1,9 @@
 //! `phantom`: a synthetic scan.
 
-use super::phantom_body::BodyArgs;
+mod body;
+
 use super::{print_json, words};
+use body::BodyArgs;
 use bonepd_ct::command::Outcome;
 use bonepd_ct::error::Result;
 use bonepd_ct::machine::session::Session;

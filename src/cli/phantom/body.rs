@@ -1,6 +1,6 @@
 //! `phantom --body`: an analytic body and how it lies in the scan.
 
-use super::words;
+use crate::cli::words;
 use bonepd_ct::pipeline::phantom::{BodyKind, BodyParams, Orientation};
 use clap::Args;
 

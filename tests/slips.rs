@@ -23,7 +23,7 @@ fn flags_of_other_programs_are_hinted() {
             &["solve", "d", "--boundary-condition", "fixed"],
             "--ends free or bonded",
         ),
-        (&["solve", "d", "-o", "x"], "leave -o out"),
+        (&["solve", "d", "-o", "x"], "omit -o"),
         (&["run", "scan.nii", "-o", "d"], "the recipe comes first"),
     ] {
         let (code, _, stderr) = run(args);

@@ -103,12 +103,10 @@ fn flag(word: &str) -> Option<String> {
     let bare = bare.split('=').next().unwrap_or(bare).to_lowercase();
     let bare = bare.replace('_', "-");
     if ["o", "out"].contains(&bare.as_str()) {
-        return Some(
-            "results go into the folder of the segmented scan itself: leave -o out".to_owned(),
-        );
+        return Some("results go into the folder of the segmented scan itself: omit -o".to_owned());
     }
     let (_, meant) = FLAGS
         .iter()
         .find(|(names, _)| names.contains(&bare.as_str()))?;
-    Some(format!("here it is {meant}"))
+    Some(format!("use {meant}"))
 }

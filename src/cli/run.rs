@@ -62,7 +62,8 @@ pub fn run(args: &RunArgs, session: &Session, json: bool) -> Result<Outcome> {
     recipe.error = args.error.or(recipe.error);
     args.segment.apply(&mut recipe.segment)?;
     args.lattice.apply(&mut recipe.lattice)?;
-    args.solve.apply(&mut recipe.solve)?;
+    args.solve
+        .apply(&mut recipe.solve, recipe.error.is_some())?;
     let selection = Selection {
         recursive: args.recursive,
         pattern: args.pattern.clone(),

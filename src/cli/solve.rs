@@ -3,7 +3,7 @@
 use super::settings::{LatticeSettings, TissueSettings};
 use super::{print_json, words};
 use bonepd_ct::command::{Outcome, run_settings};
-use bonepd_ct::error::Result;
+use bonepd_ct::error::{Error, Result};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::apparent::fields::Field;
@@ -102,8 +102,15 @@ pub struct SolveSettings {
 }
 
 impl SolveSettings {
-    /// What was said here wins over `params`.
-    pub fn apply(&self, params: &mut SolveParams) -> Result<()> {
+    /// What was said here wins over `params`. `by_error`: an error target chooses the voxel elements.
+    ///
+    /// # Errors
+    /// Settings that do not fit each other, or the error target.
+    pub fn apply(&self, params: &mut SolveParams, by_error: bool) -> Result<()> {
+        if by_error {
+            self.refuse_resolution()?;
+            params.method = Method::VoxelFe;
+        }
         params.method = self.method.unwrap_or(params.method);
         self.tissue.apply(params)?;
         params.poisson = self.poisson.unwrap_or(params.poisson);
@@ -133,11 +140,30 @@ impl SolveSettings {
         }
         params.check()
     }
+
+    /// # Errors
+    /// A method or resolution where the error target of a recipe chooses both.
+    fn refuse_resolution(&self) -> Result<()> {
+        let given = [
+            ("--method", self.method.is_some()),
+            ("--refine", self.refine.is_some()),
+            ("--refine-mask", self.refine_mask.is_some()),
+            ("--coarsen", self.coarsen.is_some()),
+        ];
+        match given.iter().find(|(_, is_given)| *is_given) {
+            None => Ok(()),
+            Some((flag, _)) => Err(Error::setting(
+                *flag,
+                "the recipe's error target chooses method and element size",
+                format!("leave {flag} out, or take a recipe without `error` (paper, quick)"),
+            )),
+        }
+    }
 }
 
 pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut params = start(args, session);
-    args.settings.apply(&mut params)?;
+    args.settings.apply(&mut params, args.error.is_some())?;
     let mut lattice = bonepd_ct::command::lattice::settings(&args.dir)?;
     args.lattice.apply(&mut lattice)?;
     if args.export.is_some() {

@@ -55,14 +55,17 @@ pub(super) fn plan(
     bar.finish_and_clear();
     let estimates: Vec<Estimate> = results.iter().map(|r| r.estimate).collect();
     let seconds = estimates.iter().filter_map(|e| e.time_s).sum::<f64>();
-    let time = time_in_words(seconds);
+    let time = match seconds {
+        s if s < 1.0 => time_in_words(s),
+        s => format!("about {}", time_in_words(s)),
+    };
     let unknown = estimates.iter().filter(|e| e.time_s.is_none()).count();
     let rest = match unknown {
         0 => String::new(),
         n => format!(", and {n} whose time is not known before reading"),
     };
     session.result(format!(
-        "scans: {}; about {time} one after the other{rest}",
+        "scans: {}; {time} one after the other{rest}",
         jobs.len()
     ));
     results

@@ -114,7 +114,7 @@ fn against_bv_tv(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
         stem: "bv-tv".to_owned(),
         title: "Stiffness and bone volume fraction".to_owned(),
         caption: format!(
-            "One point a scan, its answer; bars: all of its stated error; dashed: least squares of each group of three scans or more.{caption}"
+            "One point a scan, its answer; bars: all of its stated error, down to 0 at most; dashed: least squares of each group of three scans or more.{caption}"
         ),
         x: Axis::linear("BV/TV"),
         y: Axis::linear("apparent modulus (MPa)"),
@@ -124,11 +124,7 @@ fn against_bv_tv(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
 }
 
 fn point(answer: &AnswerLine, x: f64) -> Option<Point> {
-    Some(Point {
-        x,
-        y: answer.e_app_mpa?,
-        y_error: answer.error_mpa.map(|e| [e, e]),
-    })
+    Some(Point::modulus(x, answer.e_app_mpa?, answer.error_mpa))
 }
 
 /// None for fewer than two scans or too many.
@@ -158,7 +154,7 @@ fn scan_by_scan(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
     Some(Figure {
         stem: "answers".to_owned(),
         title: "Apparent modulus of each scan".to_owned(),
-        caption: format!("Bars: all of the stated error.{caption}"),
+        caption: format!("Bars: all of the stated error, down to 0 at most.{caption}"),
         x: Axis {
             categories: kept.iter().map(|a| a.scan.clone()).collect(),
             ..Axis::linear("")

@@ -90,16 +90,20 @@ fn curves<'a>(
     all.filter(|c| !c.points.is_empty()).collect()
 }
 
-/// E_app against lattice parameter, a figure per scan. Extrapolated values are level lines.
+/// E_app against lattice parameter, a figure per scan that carries load. Extrapolated values are level lines.
 pub fn convergence(rows: &[Row]) -> Vec<Figure> {
     let solved = solved(rows);
     let sizes = |scan: &str| {
         let own = solved.iter().filter(|s| s.row.key.scan == scan);
         distinct(own.map(|s| s.row.key.lp_mm.to_bits())).len()
     };
+    let carries_load = |scan: &str| {
+        let own = |s: &&SolvedRow| s.row.key.scan == scan;
+        solved.iter().filter(own).any(|s| s.e_app_mpa > 0.0)
+    };
     distinct(solved.iter().map(|s| &s.row.key.scan))
         .into_iter()
-        .filter(|scan| sizes(scan) > 1)
+        .filter(|scan| sizes(scan) > 1 && carries_load(scan))
         .map(|scan| convergence_of(scan, &solved))
         .collect()
 }
@@ -141,7 +145,7 @@ fn convergence_of(scan: &str, solved: &[SolvedRow]) -> Figure {
         scan: Some(scan.to_owned()),
         title: format!("Convergence of {scan}"),
         caption: format!(
-            "Apparent modulus against lattice parameter (element size for voxel FE). Bars: all of the stated error; level lines: limits.{}",
+            "Apparent modulus against lattice parameter (element size for voxel FE). Bars: all of the stated error, down to 0 at most; level lines: limits.{}",
             tissue(&found)
         ),
         x: Axis::linear("lattice parameter (mm)"),
@@ -166,11 +170,7 @@ fn tissue(found: &[SolvedRow]) -> String {
 
 /// With all that is stated of its error, where the resolution's is.
 fn with_error(s: &SolvedRow) -> Point {
-    Point {
-        x: s.row.key.lp_mm,
-        y: s.e_app_mpa,
-        y_error: s.row.error_mpa().map(|e| [e, e]),
-    }
+    Point::modulus(s.row.key.lp_mm, s.e_app_mpa, s.row.error_mpa())
 }
 
 /// Wall time of each solve against its size; None for fewer than three solves.

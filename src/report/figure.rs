@@ -101,4 +101,13 @@ impl Point {
             y_error: None,
         }
     }
+
+    /// A modulus with its stated error. The bar ends at 0: no modulus is below.
+    pub fn modulus(x: f64, e_app_mpa: f64, error_mpa: Option<f64>) -> Point {
+        Point {
+            x,
+            y: e_app_mpa,
+            y_error: error_mpa.map(|e| [e.min(e_app_mpa.max(0.0)), e]),
+        }
+    }
 }

@@ -47,7 +47,11 @@ fn stiffness_text(pages: &[ScanPage]) -> String {
     let of = |page: &ScanPage| {
         let shown = page.stiffness.as_ref()?;
         let (conditions, constants) = (&shown.conditions, shown.constants.markdown());
-        Some(format!("\n### {}\n\n{conditions}.\n\n{}\n{constants}", page.scan, shown.matrix.markdown()))
+        Some(format!(
+            "\n### {}\n\n{conditions}.\n\n{}\n{constants}",
+            page.scan,
+            shown.matrix.markdown()
+        ))
     };
     let all: Vec<String> = pages.iter().filter_map(of).collect();
     match all.is_empty() {
@@ -64,7 +68,9 @@ fn statistics_text(statistics: &Statistics) -> String {
         records(&statistics.boxes),
     ];
     let shown = tables.iter().filter(|table| !table.body.is_empty());
-    let text: String = shown.map(|table| format!("\n{}", table.markdown())).collect();
+    let text: String = shown
+        .map(|table| format!("\n{}", table.markdown()))
+        .collect();
     match text.is_empty() {
         true => text,
         false => format!("\n## Statistics of methods\n{text}"),

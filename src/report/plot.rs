@@ -200,10 +200,10 @@ fn nice([low, high]: [f64; 2]) -> [f64; 2] {
     [(low / step).floor() * step, (high / step).ceil() * step]
 }
 
-/// 0.1, 0.2, 10: what a reader of a log axis expects.
+/// 0.1, 0.2, 10, 2e4: what a reader of a log axis expects, short enough for its last label to fit.
 fn plain_ticks() -> TickFormat {
     TickFormat::Custom(std::sync::Arc::new(|v| match v {
-        v if (1e-4..1e6).contains(&v) => format!("{}", (v * 1e6).round() / 1e6),
+        v if (1e-4..1e4).contains(&v) => format!("{}", (v * 1e6).round() / 1e6),
         v => format!("{v:e}"),
     }))
 }

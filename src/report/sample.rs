@@ -46,10 +46,17 @@ impl Sample {
 
 /// The methods to compare, and a line on each reason for which rows are left out. Both empty for fewer than three scans.
 ///
-/// Only converged rows of the settings that most scans share are compared (of the first, where several are shared alike).
+/// Scans that carry no load by any method are left out: all methods agree on them. Only converged rows of the settings that most scans share are compared (of the first, where several are shared alike).
 pub fn samples(rows: &[Row]) -> (Vec<Sample>, Vec<String>) {
     let usable = |row: &&Row| row.converged() != Some(false) && row.e_app_mpa().is_some();
-    let known = rows.iter().filter(|row| Model::of(row).is_some());
+    let carries_load = |scan: &str| {
+        let own = |row: &&Row| row.key.scan == scan;
+        let mut moduli = rows.iter().filter(own).filter_map(Row::e_app_mpa);
+        moduli.any(|e| e > 0.0)
+    };
+    let known = rows
+        .iter()
+        .filter(|row| Model::of(row).is_some() && carries_load(&row.key.scan));
     // Where a lattice falls is chance, no setting: limits are over all registrations.
     let comparable: Vec<Row> = known
         .clone()

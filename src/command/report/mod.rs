@@ -247,7 +247,12 @@ fn stiffness_table(pages: &[ScanPage], dirs: &[PathBuf]) -> Option<(String, Vec<
         Some(StiffnessLine::of(&record))
     };
     let lines: Vec<StiffnessLine> = pages.iter().filter_map(of).collect();
-    (!lines.is_empty()).then(|| ("stiffness.csv".to_owned(), table::to_csv(&lines).into_bytes()))
+    (!lines.is_empty()).then(|| {
+        (
+            "stiffness.csv".to_owned(),
+            table::to_csv(&lines).into_bytes(),
+        )
+    })
 }
 
 /// Fields, curves and models that were asked for.

@@ -82,11 +82,7 @@ pub const COMPARISONS: [Column; 17] = [
         "",
         "difference_low if all scans of one group were too high and all of the other too low by their stated errors",
     ),
-    column(
-        "widened_high",
-        "",
-        "difference_high in the same worst case",
-    ),
+    column("widened_high", "", "difference_high in the same worst case"),
 ];
 
 pub const STIFFNESS: [Column; 13] = [
@@ -103,7 +99,11 @@ pub const STIFFNESS: [Column; 13] = [
     column("g23_mpa", "MPa", "shear modulus in the plane of axes 2, 3"),
     column("g13_mpa", "MPa", "in the plane of axes 1, 3"),
     column("g12_mpa", "MPa", "in the plane of axes 1, 2"),
-    column("nu23", "", "Poisson's ratio: strain along 3 under stress along 2"),
+    column(
+        "nu23",
+        "",
+        "Poisson's ratio: strain along 3 under stress along 2",
+    ),
     column("nu13", "", "strain along 3 under stress along 1"),
     column("nu12", "", "strain along 2 under stress along 1"),
     column(

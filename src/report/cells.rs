@@ -143,6 +143,22 @@ pub fn length(mm: f64) -> Cell {
     }
 }
 
+/// A time in s: two decimals, or whole seconds from a minute on.
+pub fn time(seconds: Option<f64>) -> Cell {
+    let plain = number(seconds);
+    match seconds {
+        Some(s) if s < 60.0 => Cell {
+            text: format!("{s:.2}"),
+            ..plain
+        },
+        Some(s) => Cell {
+            text: format!("{s:.0}"),
+            ..plain
+        },
+        None => plain,
+    }
+}
+
 /// A p value in two digits.
 pub fn p_value(p: Option<f64>) -> Cell {
     let text = match p {

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::report::answers;
-use crate::report::cells::{Cell, Table, length, link, number, records, text, with_error};
+use crate::report::cells::{Cell, Table, length, link, number, records, text, time, with_error};
 use crate::report::figure::Figure;
 use crate::report::group_tables;
 use crate::report::plot;
@@ -188,7 +188,7 @@ pub(super) fn solves(report: &Report) -> Table {
             with_error(line.modulus(*m), all)
         };
         cells.extend(models.iter().map(modulus));
-        cells.push(number(line.wall_s.map(|t| (t * 100.0).round() / 100.0)));
+        cells.push(time(line.wall_s));
         cells
     });
     Table::new(&head, body.collect()).without_empty_columns()

@@ -126,6 +126,11 @@ pub struct SolveSettings {
 }
 
 impl SolveSettings {
+    /// Whether a load is given.
+    pub fn names_load(&self) -> bool {
+        self.load.is_some()
+    }
+
     /// What was said here wins over `params`.
     pub fn apply(&self, params: &mut SolveParams) -> Result<()> {
         params.method = self.method.unwrap_or(params.method);

@@ -81,10 +81,12 @@ pub fn estimate(input: &Path, spacing_mm: Option<[f64; 3]>, recipe: &Recipe) -> 
         volume_mm3: size_mm.map(|size| size.iter().product()),
     };
     let (mut model_bytes, mut time_s) = (0.0f64, Some(0.0));
-    for job in jobs(&recipe.lattice, &recipe.solve) {
-        let cost = job.cost(&recipe.solve, known)?;
-        model_bytes = model_bytes.max(cost.bytes[1]);
-        time_s = time_s.zip(cost.time_s).map(|(a, b)| a + b);
+    for solve in recipe.solves() {
+        for job in jobs(&recipe.lattice, &solve) {
+            let cost = job.cost(&solve, known)?;
+            model_bytes = model_bytes.max(cost.bytes[1]);
+            time_s = time_s.zip(cost.time_s).map(|(a, b)| a + b);
+        }
     }
     Ok(Estimate {
         voxels: extent.map(|e| e.voxels),
@@ -127,7 +129,8 @@ pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Re
         let cost = needed(&job, prepared, params)?;
         bytes = bytes.max(kept + cost.bytes[0]);
         no_bone &= cost.bytes[0] == 0.0;
-        time_s = time_s.zip(cost.time_s).map(|(a, b)| a + b);
+        let loads = recipe.solves().len() as f64;
+        time_s = time_s.zip(cost.time_s).map(|(a, b)| a + loads * b);
     }
     // A lattice may lose the path that the bone has.
     let no_bone = no_bone && !bone_connects(specimen, params);

@@ -11,6 +11,7 @@ use crate::record::{details, specimen};
 use crate::result::derived::with_derived;
 use crate::result::details::Details;
 use crate::result::row::Row;
+use crate::result::settings::Settings;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -42,6 +43,13 @@ pub fn set_aside_stale(dir: &Path, session: &Session) {
             dir.display()
         ));
     }
+}
+
+/// Settings and details of the solves in `dir`; empty where there are none.
+pub fn details(dir: &Path) -> Vec<(Settings, Details)> {
+    let rows = Record::read(dir).map_or(Vec::new(), |record| record.rows);
+    let of = |keyed: KeyedRow| (keyed.row.key, keyed.details);
+    rows.into_iter().map(of).collect()
 }
 
 /// Writes `results.csv`; an older one that was set aside goes.
@@ -274,7 +282,7 @@ fn key(blank: &Row, params: &SolveParams) -> String {
 mod tests {
     use super::*;
     use crate::result::row::Solution;
-    use crate::result::settings::{BoundaryRule, Settings};
+    use crate::result::settings::BoundaryRule;
 
     const FIRM: BoundaryRule = BoundaryRule::FIRM;
     const FLOPPY: BoundaryRule = BoundaryRule::FLOPPY;

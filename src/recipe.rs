@@ -1,9 +1,12 @@
 //! Owns the recipe file: all stages' settings in TOML, unknown keys refused with the nearest known one named.
 
+pub mod built_in;
+
 use crate::error::{Error, Result};
 use crate::image::scan;
 use crate::io::percent;
-use crate::pipeline::apparent::SolveParams;
+use crate::pipeline::apparent::checks::needs_modulus;
+use crate::pipeline::apparent::{Load, SolveParams};
 use crate::pipeline::lattice::LatticeParams;
 use crate::pipeline::segment::SegmentParams;
 use crate::report::ReportParams;
@@ -11,33 +14,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;
 
-/// The recipes that are in the program: name and text.
-pub const BUILT_IN: [(&str, &str); 4] = [
-    ("paper", include_str!("../pipelines/paper.toml")),
-    ("quick", include_str!("../pipelines/quick.toml")),
-    ("to-an-error", include_str!("../pipelines/to-an-error.toml")),
-    (
-        "bcc-against-sc",
-        include_str!("../pipelines/bcc-against-sc.toml"),
-    ),
-];
-
-/// The text of a recipe that is in the program.
-///
-/// # Errors
-/// None of this name.
-pub fn built_in(name: &str) -> Result<&'static str> {
-    let found = BUILT_IN.iter().find(|(known, _)| *known == name);
-    let names = BUILT_IN.map(|(known, _)| known).join(", ");
-    let none = || {
-        Error::setting(
-            "recipe",
-            format!("no recipe in the program is named `{name}`"),
-            format!("name one of {names}"),
-        )
-    };
-    found.map(|(_, text)| *text).ok_or_else(none)
-}
+pub use built_in::{BUILT_IN, SCENES, built_in};
 
 /// Settings of a whole run. What a file leaves out takes its default.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -47,6 +24,8 @@ pub struct Recipe {
     /// what `[lattice]` says is not used.
     #[serde(deserialize_with = "percent::optional")]
     pub error: Option<f64>,
+    /// Loads of every scan, each a solve of its own with all else of `[solve]`; that of `[solve]` alone where there are none.
+    pub loads: Vec<Load>,
     pub segment: SegmentParams,
     pub lattice: LatticeParams,
     pub solve: SolveParams,
@@ -78,7 +57,7 @@ impl Recipe {
             Error::file(
                 path,
                 format!("expected a recipe, could not read it: {found}"),
-                "name a TOML file with tables [segment], [lattice], [solve], [report], before the scans; or a recipe in the program: paper, quick, to-an-error, bcc-against-sc (`bonepd-ct recipe NAME` prints one)",
+                format!("name a TOML file with tables [segment], [lattice], [solve], [report], before the scans; or a recipe in the program: {} (`bonepd-ct recipe NAME` prints one)", built_in::names()),
             )
         })?;
         Recipe::parse(&text, path)
@@ -105,7 +84,31 @@ impl Recipe {
         }
         self.segment.check()?;
         self.lattice.check()?;
-        self.solve.check()
+        if self.loads.len() > 1 && !self.solve.fields.is_empty() {
+            return Err(Error::setting(
+                "solve.fields",
+                "fields of several loads would overwrite each other",
+                "leave fields out, or run the loads one by one (solve --load)",
+            ));
+        }
+        self.solves().iter().try_for_each(|solve| {
+            if self.error.is_some() {
+                needs_modulus(solve.load, "error")?;
+            }
+            solve.check()
+        })
+    }
+
+    /// The solves of every scan: one of each load.
+    pub fn solves(&self) -> Vec<SolveParams> {
+        if self.loads.is_empty() {
+            return vec![self.solve.clone()];
+        }
+        let of = |&load: &Load| SolveParams {
+            load,
+            ..self.solve.clone()
+        };
+        self.loads.iter().map(of).collect()
     }
 }
 
@@ -209,7 +212,10 @@ mod tests {
     fn recipes_in_the_program_are_recipes() {
         for (name, text) in BUILT_IN {
             assert!(Recipe::read(Path::new(name)).is_ok(), "{name}");
-            assert_eq!(built_in(name).unwrap(), text);
+            assert_eq!(built_in(name).unwrap(), *text);
+        }
+        for (name, _) in SCENES {
+            assert!(built_in::any(name).is_ok() && built_in(name).is_err(), "{name}");
         }
         assert!(
             built_in("papre")
@@ -217,6 +223,21 @@ mod tests {
                 .to_string()
                 .contains("to-an-error")
         );
+    }
+
+    #[test]
+    fn several_loads_are_several_solves() {
+        let recipe = parse("loads = [\"uniaxial\", \"shear-x\"]").unwrap();
+        let loads: Vec<Load> = recipe.solves().iter().map(|solve| solve.load).collect();
+        assert_eq!(loads, [Load::Uniaxial, Load::ShearX]);
+        for (text, said) in [
+            ("loads = [\"uniaxial\", \"torsion\"]\n[solve]\nfields = [\"sed\"]", "overwrite"),
+            ("loads = [\"shear-z\"]", "along the long axis"),
+            ("error = 0.1\nloads = [\"torsion\"]", "torsion has none"),
+        ] {
+            let words = parse(text).unwrap_err().to_string();
+            assert!(words.contains(said), "{words}");
+        }
     }
 
     #[test]

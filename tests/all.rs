@@ -19,6 +19,7 @@ mod inputs;
 mod lattice_checks;
 mod laws;
 mod layers;
+mod loads;
 mod molecular;
 mod order;
 mod orientation;

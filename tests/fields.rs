@@ -54,7 +54,7 @@ fn recorded(params: &SolveParams) -> Recorded {
 
 fn at(recorded: &Recorded, name: &str, [x, y, z]: [usize; 3]) -> f64 {
     let field = recorded.fields.iter().find(|f| f.name == name).unwrap();
-    f64::from(field.values.values[[z, y, x]])
+    f64::from(field.components[0].values[[z, y, x]])
 }
 
 fn near(found: f64, wanted: f64) {
@@ -84,7 +84,7 @@ fn a_homogeneous_block_has_the_fields_and_the_failure_load_of_a_bar() {
         }
         let failure = r.failure.unwrap();
         near(failure.factor, 0.7);
-        near(failure.load_n, 7.0 * area);
+        near(failure.failure_load_n.unwrap(), 7.0 * area);
     }
 }
 
@@ -94,7 +94,7 @@ fn the_failure_load_is_the_specimens_not_the_load_cases() {
     let load = |change: &dyn Fn(&mut SolveParams)| {
         let mut settings = params();
         change(&mut settings);
-        recorded(&settings).failure.unwrap().load_n
+        recorded(&settings).failure.unwrap().failure_load_n.unwrap()
     };
     let once = load(&|_| ());
     near(load(&|p| p.strain = 0.002), once);
@@ -128,7 +128,7 @@ fn the_weaker_layer_fails_first() {
         ..params()
     };
     let r = recorded(&series);
-    near(r.failure.unwrap().factor, 0.007 / 0.015);
+    near(r.failure.as_ref().unwrap().factor, 0.007 / 0.015);
     near(at(&r, "sed_mpa", [0, 0, 1]), 0.5 * 1000.0 * 0.015 * 0.015);
     near(at(&r, "sed_mpa", [0, 0, 6]), 0.5 * 3000.0 * 0.005 * 0.005);
     near(at(&r, "von_mises_mpa", [0, 0, 6]), 15.0);
@@ -213,7 +213,7 @@ fn fields_are_written_on_the_scans_grid() {
     assert!(String::from_utf8_lossy(&vti).contains("Origin=\"2.99 -2.01 0.99\""));
     assert!(said.contains("failure load 0.067 N"), "{said}");
     let rows: Vec<Row> = table::read(&dir.path().join("out/results.csv")).unwrap();
-    let load = rows[0].solved.as_ref().unwrap().failure.unwrap().load_n;
+    let load = rows[0].failure().unwrap().load_n.unwrap();
     assert!((load / (7.0 * 0.12 * 0.08) - 1.0).abs() < 1e-2, "{load}");
     let (code, _, stderr) = run(&["solve", &out, "--fields", "sed,von-mises"]);
     assert!(code == 2 && stderr.contains("voxel-fe"), "{stderr}");

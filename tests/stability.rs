@@ -9,6 +9,7 @@ use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::sparse::Sparse;
 use bonepd_ct::physics::hex8::element::Integration;
 use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
+use bonepd_ct::pipeline::apparent::motion::EndMotion;
 use bonepd_ct::pipeline::apparent::solve_lattice;
 use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::solved::Solved;
@@ -420,8 +421,13 @@ fn contrast(soft: f32) -> (usize, f64, f64) {
     let grips = Planes::within(&grid, Axis::Z, 0.0).unwrap();
     let mesh = VoxelMesh::new(grid, bone, |_| true, grips).unwrap();
     let length = grid.size_mm()[2];
-    let held = supports::held(&mesh, grips, &poisson(0.3));
-    let start = supports::bar(&mesh, grips, length);
+    let stretched = SolveParams {
+        strain: 1.0,
+        ..poisson(0.3)
+    };
+    let motion = EndMotion::of(&specimen, &stretched, length);
+    let held = supports::held(&mesh, grips, &motion, stretched.load);
+    let start = supports::start(&mesh, grips, &motion);
     let factor = |e: usize| if bone[e] == 1 { 1.0 } else { soft };
     let model = Heterogeneous::new(mesh, 1000.0, 0.3, Integration::Full, factor);
     let amg = Amg::new(&model, &held, &AmgParams::new(grid.spacing_mm));

@@ -2,23 +2,32 @@
 
 use bonepd_ct::command::Outcome;
 use bonepd_ct::error::Result;
-use bonepd_ct::recipe::{BUILT_IN, built_in};
+use bonepd_ct::recipe::{BUILT_IN, SCENES, built_in};
 use clap::Args;
 use std::io::Write;
 
-/// Print a recipe that is in the program, to keep and change; without a name, list them
+/// Print a recipe or a scene that is in the program, to keep and change; without a name, list them
 ///
 /// `bonepd-ct recipe paper > paper.toml`; `bonepd-ct run paper SCAN -o OUT` takes it as it is.
 #[derive(Args)]
 pub struct RecipeArgs {
-    /// Name of the recipe
+    /// Name of the recipe or scene
     name: Option<String>,
 }
 
 pub fn run(args: &RecipeArgs) -> Result<Outcome> {
     let text = match &args.name {
-        Some(name) => built_in(name)?.to_owned(),
-        None => BUILT_IN.map(|(name, text)| line(name, text)).concat(),
+        Some(name) => built_in::any(name)?.to_owned(),
+        None => {
+            let lines = |files: &[(&str, &str)]| -> String {
+                files.iter().map(|(name, text)| line(name, text)).collect()
+            };
+            format!(
+                "recipes of `bonepd-ct run`:\n{}\nscenes of `bonepd-ct scene`:\n{}",
+                lines(BUILT_IN),
+                lines(SCENES)
+            )
+        }
     };
     let _ = std::io::stdout().write_all(text.as_bytes());
     Ok(Outcome::Done)
@@ -27,5 +36,5 @@ pub fn run(args: &RecipeArgs) -> Result<Outcome> {
 /// The name, and the first line of the recipe's own words.
 fn line(name: &str, text: &str) -> String {
     let first = text.lines().next().unwrap_or_default();
-    format!("{name:<16} {}\n", first.trim_start_matches(['#', ' ']))
+    format!("{name:<40} {}\n", first.trim_start_matches(['#', ' ']))
 }

@@ -21,7 +21,7 @@ use std::path::PathBuf;
 /// the recipe's. Started again, a run keeps what is up to date and goes on where it was stopped.
 #[derive(Args)]
 pub struct RunArgs {
-    /// Recipe file (TOML), or the name of a recipe in the program: paper, quick, to-an-error, bcc-against-sc (`bonepd-ct recipe`)
+    /// Recipe file (TOML), or the name of a recipe in the program, as paper or hrpqct (`bonepd-ct recipe` lists them)
     recipe: PathBuf,
     /// Scans, folders of scans (a folder of slices is one scan), or manifests (.csv with a column path, and any of name,
     /// subject, group, spacing_mm, lower, upper, otsu, gaussian_voxels)
@@ -64,6 +64,10 @@ pub fn run(args: &RunArgs, session: &Session, json: bool) -> Result<Outcome> {
     args.lattice.apply(&mut recipe.lattice)?;
     args.solve
         .apply(&mut recipe.solve, recipe.error.is_some())?;
+    if args.solve.names_load() {
+        recipe.loads.clear();
+    }
+    recipe.check()?;
     let selection = Selection {
         recursive: args.recursive,
         pattern: args.pattern.clone(),

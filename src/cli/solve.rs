@@ -7,7 +7,10 @@ use bonepd_ct::error::{Error, Result};
 use bonepd_ct::grid::Axis;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::apparent::fields::Field;
-use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, SolveParams};
+use bonepd_ct::pipeline::apparent::checks::needs_modulus;
+use bonepd_ct::pipeline::apparent::{
+    CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams,
+};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -53,17 +56,25 @@ pub struct SolveSettings {
     /// Thickness of each grip in mm; 0 grips the end planes [default: 0]
     #[arg(long, value_name = "MM", value_parser = words::number)]
     grip_mm: Option<f64>,
-    /// uniaxial, confined (sides held), or stiffness (voxel-fe: all six unit strains, to DIR/stiffness.json) [default: uniaxial]
-    #[arg(long, value_parser = words::choice::<Load>(&["uniaxial", "confined", "stiffness"]))]
+    /// uniaxial; confined (sides held); stiffness (voxel-fe: all six unit strains, to DIR/stiffness.json); shear-x, -y, -z (the
+    /// upper end moves that way by strain times height); bending-x, -y, -z (both ends tilt about that axis by half of
+    /// --angle-deg, opposite ways); torsion (the upper end turns about the long axis by --angle-deg). Shear, bending and
+    /// torsion hold both ends in all components, about the middle of the grid [default: uniaxial]
+    #[arg(long, value_parser = words::choice::<Load>(Load::WORDS), hide_possible_values = true)]
     load: Option<Load>,
-    /// free: the loaded ends slide sideways (no friction); bonded: they are held sideways [default: free]
+    /// Bending and torsion: degrees by which the ends turn against each other [default: 1]
+    #[arg(long, value_name = "A", value_parser = words::number, allow_negative_numbers = true)]
+    angle_deg: Option<f64>,
+    /// Uniaxial and confined loads: free, the loaded ends slide sideways (no friction), or bonded, they are held sideways
+    /// [default: free]
     #[arg(long, value_parser = words::choice::<Ends>(&["free", "bonded"]))]
     ends: Option<Ends>,
-    /// --load stiffness: what the unit strains do on the faces: kinematic (an upper bound), or mixed
-    /// (periodicity-compatible, Pahr & Zysset 2008) [default: kinematic]
-    #[arg(long, value_parser = words::choice::<Conditions>(&["kinematic", "mixed"]))]
+    /// --load stiffness: what the unit strains do on the faces: kinematic (an upper bound), mixed (periodicity-compatible,
+    /// Pahr & Zysset 2008), or symshear (rollers, and shears on two pairs of faces: direct mechanics of Faim)
+    /// [default: kinematic]
+    #[arg(long, value_parser = words::choice::<Conditions>(Conditions::WORDS))]
     conditions: Option<Conditions>,
-    /// Load axis [default: z]
+    /// Long axis, from end to end [default: z]
     #[arg(long, value_parser = words::choice::<Axis>(&["x", "y", "z"]))]
     axis: Option<Axis>,
     /// Algebraic error allowed in the modulus, as 0.1% or 0.001 [default: 0.1%]
@@ -85,12 +96,22 @@ pub struct SolveSettings {
     /// Count zero-energy modes (direct factorisation; small models only)
     #[arg(long)]
     mechanisms: bool,
-    /// Fields to write, comma-separated: displacement (mm), sed (strain energy density, MPa), von-mises (MPa, voxel-fe only),
-    /// fraction (bone in an element, weight of a site). Of voxel-fe as NIfTI on the scan's grid and fields.vti for ParaView,
-    /// of a lattice as fields-LATTICE.vtk, by site [default: none]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::choice::<Field>(&["displacement", "sed", "von-mises", "fraction"]))]
+    /// Fields to write, comma-separated: displacement (mm), sed (strain energy density, MPa), fraction (bone in an element, weight
+    /// of a site), nodal-force (N); of voxel-fe also von-mises (MPa), effective-strain, strain and stress (xx, yy, zz, yz, xz,
+    /// xy; engineering shears), principal-strain and principal-stress (values and directions). Of voxel-fe as NIfTI on the
+    /// scan's grid and fields.vti for ParaView, of a lattice as fields-LATTICE.vtk, by site [default: none]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::choice::<Field>(Field::WORDS), hide_possible_values = true)]
     fields: Vec<Field>,
-    /// voxel-fe: find the failure load, where 2 % of the bone exceed an effective strain of 0.007 (Pistoia et al. 2002)
+    /// voxel-fe: the strain energy density of elements, of which effective strains and the failure load follow: centre (of the
+    /// strain at the element's centre, as Faim and ParOSol), or mean (energy over volume) [default: centre]
+    #[arg(long, value_name = "WHERE", value_parser = words::choice::<Sed>(Sed::WORDS))]
+    sed: Option<Sed>,
+    /// voxel-fe: how strains and stresses are distributed over each label's tissue (DIR/tissue.csv), and what each carries at
+    /// both ends and in the middle (DIR/sections.csv)
+    #[arg(long)]
+    statistics: bool,
+    /// voxel-fe: find the failure load, where 2 % of the bone exceed an effective strain of 0.007 (Pistoia et al. 2002); that of
+    /// 1 to 7 % goes to DIR/failure.csv
     #[arg(long)]
     failure: bool,
     /// Share of the bone in that criterion, as 2% or 0.02
@@ -99,9 +120,17 @@ pub struct SolveSettings {
     /// Effective strain in that criterion
     #[arg(long, value_name = "STRAIN", value_parser = words::positive, requires = "failure")]
     critical_strain: Option<f64>,
+    /// Only the bone of these labels counts in that criterion, comma-separated
+    #[arg(long, value_name = "LABELS", value_delimiter = ',', requires = "failure")]
+    failure_labels: Vec<i32>,
 }
 
 impl SolveSettings {
+    /// Whether a load is given.
+    pub fn names_load(&self) -> bool {
+        self.load.is_some()
+    }
+
     /// What was said here wins over `params`. `by_error`: an error target chooses the voxel elements.
     ///
     /// # Errors
@@ -117,6 +146,7 @@ impl SolveSettings {
         params.strain = self.strain.unwrap_or(params.strain);
         params.grip_mm = self.grip_mm.unwrap_or(params.grip_mm);
         params.load = self.load.unwrap_or(params.load);
+        params.angle_deg = self.angle_deg.unwrap_or(params.angle_deg);
         params.ends = self.ends.unwrap_or(params.ends);
         params.conditions = self.conditions.unwrap_or(params.conditions);
         params.axis = self.axis.unwrap_or(params.axis);
@@ -132,6 +162,11 @@ impl SolveSettings {
         params.mechanisms |= self.mechanisms;
         if !self.fields.is_empty() {
             params.fields.clone_from(&self.fields);
+        }
+        params.sed = self.sed.unwrap_or(params.sed);
+        params.statistics |= self.statistics;
+        if !self.failure_labels.is_empty() {
+            params.failure_labels.clone_from(&self.failure_labels);
         }
         if self.failure {
             let criterion = params.pistoia.get_or_insert_default();
@@ -171,6 +206,7 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     }
     let (rows, met) = match args.error {
         Some(target) => {
+            needs_modulus(params.load, "error")?;
             let found =
                 bonepd_ct::command::adaptive::solve_to(&args.dir, target, &params, session)?;
             (found.rows, found.met)

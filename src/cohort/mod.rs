@@ -280,10 +280,13 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
     if lattice::settings(dir).ok().as_ref() != Some(&recipe.lattice) || session.force {
         lattice::remember(dir, &recipe.lattice)?;
     }
-    let mut rows = match recipe.error {
-        Some(target) => adaptive::solve_to(dir, target, &recipe.solve, session)?.rows,
-        None => solve::solve(dir, &recipe.lattice, &recipe.solve, session)?,
-    };
+    let mut rows = Vec::new();
+    for params in recipe.solves() {
+        rows.extend(match recipe.error {
+            Some(target) => adaptive::solve_to(dir, target, &params, session)?.rows,
+            None => solve::solve(dir, &recipe.lattice, &params, session)?,
+        });
+    }
     for row in &mut rows {
         row.marks.group.clone_from(&job.group);
         row.marks.subject.clone_from(&job.subject);

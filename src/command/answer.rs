@@ -27,7 +27,7 @@ fn of_record(record: &SegmentRecord) -> ScanFacts {
 }
 
 /// Writes `answer.json` of the rows that one command solved in `dir`, and returns it. None, and nothing is written, where no row
-/// has a modulus. `target` is the relative error asked for.
+/// has a modulus, force or moment. `target` is the relative error asked for.
 ///
 /// # Errors
 /// A file that cannot be written.

@@ -94,10 +94,12 @@ pub fn estimate(input: &Path, spacing_mm: Option<[f64; 3]>, recipe: &Recipe) -> 
         volume_mm3: size_mm.map(|size| size.iter().product()),
     };
     let (mut model_bytes, mut time_s) = (0.0f64, Some(0.0));
-    for job in jobs(&recipe.lattice, &recipe.solve) {
-        let cost = job.cost(&recipe.solve, known)?;
-        model_bytes = model_bytes.max(cost.bytes[1]);
-        time_s = time_s.zip(cost.time_s).map(|(a, b)| a + b);
+    for solve in recipe.solves() {
+        for job in jobs(&recipe.lattice, &solve) {
+            let cost = job.cost(&solve, known)?;
+            model_bytes = model_bytes.max(cost.bytes[1]);
+            time_s = time_s.zip(cost.time_s).map(|(a, b)| a + b);
+        }
     }
     Ok(Estimate {
         voxels: extent.map(|e| e.voxels),
@@ -136,12 +138,13 @@ pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Re
     let reading = first.voxels.map_or(specimen.bone.grid.len() as f64, count);
     let mut bytes = reading * reading_bytes(recipe);
     let (mut no_bone, mut time_s) = (true, Some(reading * S_PER_VOXEL));
+    let loads = recipe.solves().len() as f64;
     for params in &steps {
         for job in jobs(&recipe.lattice, params) {
             let cost = needed(&job, prepared, params)?;
             bytes = bytes.max(kept + cost.bytes[0]);
             no_bone &= cost.bytes[0] == 0.0;
-            time_s = time_s.zip(cost.time_s).map(|(a, b)| a + b);
+            time_s = time_s.zip(cost.time_s).map(|(a, b)| a + loads * b);
         }
     }
     // A lattice may lose the path that the bone has.

@@ -5,7 +5,8 @@ use crate::error::Result;
 use crate::export::{vti, vtk};
 use crate::format::orient::{self, Turn};
 use crate::image::nifti;
-use crate::pipeline::apparent::fields::{Recorded, SiteFields};
+use crate::pipeline::apparent::fields::{FieldVolume, Place, Recorded, SiteFields};
+use crate::volume::Volume;
 use std::path::Path;
 
 /// What was asked for of a solved model.
@@ -67,16 +68,25 @@ fn write_voxels(dir: &Path, recorded: &Recorded, back: &Turn) -> Result<()> {
     let mut stored = Vec::new();
     for one in &recorded.fields {
         let file = format!("field-{}.nii.gz", one.name.replace('_', "-"));
-        let values = orient::turned(one.values.clone(), back);
-        nifti::write(&dir.join(file), &values)?;
-        stored.push((one.name, values));
-        if let Some(picture) = field::draw(&one.values) {
-            map::write_png(&dir.join(picture_name(one.name)), &picture)?;
+        let turned = |v: &Volume<f32>| orient::turned(v.clone(), back);
+        let components: Vec<Volume<f32>> = one.components.iter().map(turned).collect();
+        nifti::write_field(&dir.join(file), &components, &one.about)?;
+        if let [scalar] = &one.components[..]
+            && let Some(picture) = field::draw(scalar)
+        {
+            map::write_png(&dir.join(picture_name(&one.name)), &picture)?;
         }
+        stored.push((one, components));
     }
-    let arrays: Vec<_> = stored
+    let arrays: Vec<vti::Array> = stored
         .iter()
-        .map(|(name, values)| (*name, values))
+        .map(|(field, components): &(&FieldVolume, _)| vti::Array {
+            name: &field.name,
+            about: &field.about,
+            labels: field.labels,
+            components,
+            is_of_nodes: field.place == Place::Nodes,
+        })
         .collect();
     vti::write(&dir.join("fields.vti"), &arrays)
 }

@@ -3,28 +3,57 @@
 use crate::result::answer::AnswerLine;
 use crate::result::cautions::WARNING;
 use crate::result::notes;
-use crate::result::row::Row;
+use crate::result::row::{FailureLoad, Row};
 use crate::result::settings::BoundaryRule;
 
 /// Scan, model, modulus with all of its stated error, cost. Warnings of its note are left out: the terminal has them in lines
 /// of their own.
 pub fn in_words(row: &Row) -> String {
     let solved = row.solved.clone().unwrap_or_default();
-    let failure = solved.failure.map_or(String::new(), |failure| {
-        format!("  failure load {:.3} N", failure.load_n)
-    });
+    let failure = solved.failure.map_or(String::new(), |f| failure(&f));
     let wall = solved.wall_s.map_or("NA".to_owned(), |t| format!("{t:.2}"));
     format!(
-        "{} {:<5} {:<12} {:>7} mm  E_app {} {:>9} sites {:>6} iterations {wall:>7} s{failure}{}",
+        "{} {:<5} {:<12} {:>7} mm  {} {:>9} sites {:>6} iterations {wall:>7} s{failure}{}",
         row.key.scan,
         row.key.structure.name(),
         row.key.boundary.map_or("", BoundaryRule::name),
         (row.key.lp_mm * 1e6).round() / 1e6,
-        modulus(row),
+        answered(row),
         solved.sites.unwrap_or(0),
         solved.iterations.unwrap_or(0),
         note(row),
     )
+}
+
+/// The modulus, with stiffness and force where they are the row's own; of loads without one force or moment.
+fn answered(row: &Row) -> String {
+    let solved = row.solved.clone().unwrap_or_default();
+    let load = row.key.load.name();
+    let error = solved
+        .algebraic_error_percent
+        .map_or(String::new(), |p| format!(" (solver ± {p:.3} %)"));
+    match (solved.moment_nmm, solved.force_n.zip(solved.stiffness_n_per_mm)) {
+        (Some(moment), _) => format!("{load} moment {moment:.3} N mm{error}"),
+        (None, Some((force, k))) if !row.key.load.has_modulus() => {
+            format!("{load} force {force:.3} N, stiffness {k:.3} N/mm{error}")
+        }
+        (None, Some((force, k))) => {
+            format!("E_app {}  K {k:.6} N/mm, F {force:.6} N", modulus(row))
+        }
+        _ => format!("E_app {}", modulus(row)),
+    }
+}
+
+fn failure(failure: &FailureLoad) -> String {
+    let at = match (failure.displacement_mm, failure.strain) {
+        (Some(u), Some(strain)) => format!(" at {u:.4} mm, strain {strain:.5}"),
+        _ => String::new(),
+    };
+    match (failure.load_n, failure.moment_nmm) {
+        (Some(load), _) => format!("  failure load {load:.3} N{at}"),
+        (None, Some(moment)) => format!("  failure moment {moment:.3} N mm"),
+        (None, None) => String::new(),
+    }
 }
 
 /// The modulus, with everything that is stated of it and of what that is made.
@@ -57,7 +86,9 @@ fn note(row: &Row) -> String {
 
 /// The answer of a scan in a few words.
 pub fn answer_in_words(answer: &AnswerLine) -> String {
-    let e_app = answer.e_app_mpa.unwrap_or(f64::NAN);
+    let Some(e_app) = answer.e_app_mpa else {
+        return loads_in_words(answer);
+    };
     if e_app == 0.0 {
         return format!("carries no load: E_app 0 by {}", answer.method);
     }
@@ -73,4 +104,18 @@ pub fn answer_in_words(answer: &AnswerLine) -> String {
         answer.method,
         (answer.element_mm * 1e6).round() / 1e6
     )
+}
+
+/// The same of a load without a modulus.
+fn loads_in_words(answer: &AnswerLine) -> String {
+    let by = format!(
+        "by {} {} mm",
+        answer.method,
+        (answer.element_mm * 1e6).round() / 1e6
+    );
+    match (answer.force_n, answer.moment_nmm) {
+        (Some(force), _) => format!("{} force {force:.3} N {by}", answer.load),
+        (None, Some(moment)) => format!("{} moment {moment:.3} N mm {by}", answer.load),
+        (None, None) => format!("{}: no answer {by}", answer.load),
+    }
 }

@@ -21,6 +21,8 @@ pub fn of_run(dir: &Path) -> Option<(PathBuf, SolveParams)> {
         strain: run.strain,
         grip_mm: run.grip_mm,
         load: run.load,
+        angle_deg: run.angle_deg,
+        sed: run.sed,
         ends: run.ends,
         conditions: run.conditions,
         axis: run.axis,
@@ -36,11 +38,14 @@ pub fn in_words(params: &SolveParams) -> String {
         Some(_) => "the tissue's law".to_owned(),
         None => format!("E {} MPa", params.young_mpa),
     };
+    let far = match params.load.is_by_angle() {
+        true => format!("angle {}°", params.angle_deg),
+        false => format!("strain {}", params.strain),
+    };
     format!(
-        "load {}, axis {}, strain {}, grips {} mm, ends {}, {tissue}, ν {}",
+        "load {}, axis {}, {far}, grips {} mm, ends {}, {tissue}, ν {}",
         params.load.name(),
         params.axis.name(),
-        params.strain,
         params.grip_mm,
         params.ends.name(),
         params.poisson

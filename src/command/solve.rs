@@ -21,6 +21,7 @@ use crate::record::results::Results;
 use crate::record::specimen;
 use crate::result::cautions;
 use crate::result::derived::with_derived;
+use crate::result::details::Details;
 use crate::result::extrapolate::is_extrapolated;
 use crate::result::notes;
 use crate::result::row::{FailureLoad, Marks, Row};
@@ -50,6 +51,7 @@ pub struct OpenScan {
 /// A row with its fields, and whether it was kept from an earlier solve.
 struct Made {
     row: Row,
+    details: Details,
     fields: Fields,
     is_kept: bool,
 }
@@ -161,6 +163,7 @@ impl OpenScan {
         for (job, blank) in &jobs {
             let Some(Made {
                 mut row,
+                details,
                 fields,
                 is_kept,
             }) = self.row(job, blank, params, session)?
@@ -171,7 +174,9 @@ impl OpenScan {
             cautions::mark(&mut row, height_mm);
             session.result(format!("{}{}", in_words(&row), said_of_kept(is_kept)));
             // The row first: fields that cannot be written do not cost it.
-            self.results.store(blank, params, &row)?;
+            if !is_kept {
+                self.results.store(blank, params, &row, details)?;
+            }
             fields.write(&self.dir)?;
             rows.push(row);
         }
@@ -216,6 +221,7 @@ impl OpenScan {
         if let Some(row) = self.results.find(blank, params).filter(|_| kept) {
             return Ok(Some(Made {
                 row,
+                details: Details::default(),
                 fields: Fields::None,
                 is_kept: true,
             }));
@@ -255,22 +261,26 @@ impl OpenScan {
             show(&bar, [load, loads], step, params.tolerance);
         })?;
         bar.finish_and_clear();
-        let (row, fields) = match solution {
-            JobResult::Modulus(solved, recorded) => {
+        let (row, details, fields) = match solution {
+            JobResult::Modulus(solved, mut recorded) => {
                 let mut row = with_recorded(solved.row(blank.clone()), &recorded);
                 self.state(&mut row);
                 let stem = format!("{}-{}", name(&blank.key).replace(' ', "-"), blank.key.lp_mm);
-                (row, Fields::of(stem, recorded, specimen::axes(&self.dir)))
+                let details = std::mem::take(&mut recorded.details);
+                let fields = Fields::of(stem, recorded, specimen::axes(&self.dir));
+                (row, details, fields)
             }
             JobResult::Stiffness(solved) => {
                 let mask_blake3 = self.results.mask_blake3();
                 let record = stiffness::record(&solved, &self.specimen, params, mask_blake3);
                 stiffness::write(&self.dir, &record, session)?;
-                (stiffness::row(&solved, params, blank), Fields::None)
+                let row = stiffness::row(&solved, params, blank);
+                (row, Details::default(), Fields::None)
             }
         };
         Ok(Made {
             row: metered(row, &meter),
+            details,
             fields,
             is_kept: false,
         })
@@ -398,9 +408,12 @@ fn mark(row: &mut Row, measured: Option<&Morphometry>) {
 fn with_recorded(mut row: Row, recorded: &Recorded) -> Row {
     if let Some(solved) = &mut row.solved {
         solved.threshold_sensitivity = recorded.surface.map(|s| s.sensitivity);
-        solved.failure = recorded.failure.map(|f| FailureLoad {
-            load_n: f.load_n,
+        solved.failure = recorded.failure.as_ref().map(|f| FailureLoad {
             factor: f.factor,
+            load_n: f.failure_load_n,
+            moment_nmm: f.failure_moment_nmm,
+            displacement_mm: f.failure_displacement_mm,
+            strain: f.failure_strain,
         });
     }
     row

@@ -7,10 +7,13 @@ use crate::export::bins::Bins;
 use crate::io::atomic;
 use crate::operator::held::Held;
 use crate::pipeline::apparent::discretisation::Prepared;
+use crate::measure::apparent::Loaded;
+use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use crate::pipeline::apparent::voxel_fe::supports;
 use crate::pipeline::apparent::{Ends, Load, Method, SolveParams};
+use crate::result::settings::Motion;
 use crate::volume::Specimen;
 use std::io::Write;
 use std::path::Path;
@@ -41,7 +44,7 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
     if params.load == Load::Stiffness {
         return wrong(
             "six unit strains are six models",
-            "use --load uniaxial or confined",
+            "use --load uniaxial, confined, or another single load",
         );
     }
     let tissue = &Tissue::of(specimen, params)?;
@@ -66,7 +69,11 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
         })
         .collect();
     let materials = Materials::of(&stiffness, &poissons, bins.max(1));
-    atomic::write_with(path, |out| fill(out, mesh, grips, params, &materials))?;
+    let gauge_mm = (grips.high - grips.low) as f64 * mesh.grid.spacing_mm[params.axis.index()];
+    let motion = EndMotion::of(specimen, params, gauge_mm);
+    atomic::write_with(path, |out| {
+        fill(out, (mesh, grips), (params, &motion), &materials)
+    })?;
     Ok(materials.worst)
 }
 
@@ -105,23 +112,40 @@ impl Materials {
     }
 }
 
+/// What the forces of the upper end say.
+fn said(motion: &EndMotion, params: &SolveParams) -> String {
+    let Loaded {
+        gauge_mm,
+        displacement_mm,
+        ..
+    } = motion.loaded;
+    let [x, y, z] = motion.middle_at(gauge_mm);
+    match motion.motion {
+        Motion::Along => format!(
+            "E_app = force of HIGH x {gauge_mm} mm / (area x {displacement_mm} mm)"
+        ),
+        Motion::Sideways(direction) => format!(
+            "force of HIGH along {} moves it by {displacement_mm} mm",
+            direction.name()
+        ),
+        Motion::Tilt(_) | Motion::Turn => format!(
+            "{} by {} degrees; moment of HIGH = sum of r x force of its nodes, r from {x}, {y}, {z} mm",
+            params.load.name(),
+            params.angle_deg
+        ),
+    }
+}
+
 fn fill(
     out: &mut impl Write,
-    mesh: &VoxelMesh,
-    grips: Planes,
-    params: &SolveParams,
+    (mesh, grips): (&VoxelMesh, Planes),
+    (params, motion): (&SolveParams, &EndMotion),
     materials: &Materials,
 ) -> std::io::Result<()> {
     let axis = params.axis.index();
-    let gauge_mm = (grips.high - grips.low) as f64 * mesh.grid.spacing_mm[axis];
-    let held = supports::held(mesh, grips, params);
-    let u = supports::bar(mesh, grips, params.strain * gauge_mm);
-    writeln!(
-        out,
-        "** {} elements; mm, N, MPa; E_app = force of HIGH x {gauge_mm} mm / (area x {} mm)",
-        mesh.elements,
-        params.strain * gauge_mm
-    )?;
+    let held = supports::held(mesh, grips, motion, params.load);
+    let u = supports::start(mesh, grips, motion);
+    writeln!(out, "** {} elements; mm, N, MPa; {}", mesh.elements, said(motion, params))?;
     writeln!(out, "*NODE, NSET=ALL")?;
     let nodes = || (0..mesh.len()).filter(|&node| mesh.around[node] != 0);
     for node in nodes() {
@@ -151,7 +175,15 @@ fn fill(
             writeln!(out, "{}, {c}, {c}, 0.0", node + 1, c = component + 1)?;
         }
     }
-    writeln!(out, "*NODE PRINT, NSET=HIGH, TOTALS=ONLY\nRF\n*END STEP")
+    // A moment needs the force of every node.
+    let totals = match motion.motion.is_by_angle() {
+        true => "YES",
+        false => "ONLY",
+    };
+    writeln!(
+        out,
+        "*NODE PRINT, NSET=HIGH, TOTALS={totals}\nRF\n*END STEP"
+    )
 }
 
 /// An element's number in the file, and the node of smallest x, y, z: its segment and place there.

@@ -13,39 +13,76 @@ use std::path::Path;
 /// Bytes of one compressed block.
 const BLOCK: usize = 1 << 20;
 
-/// Writes volumes on one grid as cells of an image at its place in the world, one array each.
-pub fn write(path: &Path, arrays: &[(&str, &Volume<f32>)]) -> Result<()> {
-    let Some((_, first)) = arrays.first() else {
+/// One array of an image.
+pub struct Array<'a> {
+    pub name: &'a str,
+    /// In words, kept as a comment.
+    pub about: &'a str,
+    /// Names of the components; empty for a scalar.
+    pub labels: &'static [&'static str],
+    pub components: &'a [Volume<f32>],
+    /// On the corners of the voxels instead of the voxels.
+    pub is_of_nodes: bool,
+}
+
+/// Writes arrays on one grid as cells, and corners, of an image at its place in the world.
+pub fn write(path: &Path, arrays: &[Array]) -> Result<()> {
+    let Some(first) = arrays.first() else {
         return Ok(());
     };
-    let blocks: Vec<Vec<u8>> = arrays.iter().map(|(_, v)| compressed(v)).collect();
-    let [nx, ny, nz] = first.grid.n;
-    let [sx, sy, sz] = first.grid.spacing_mm;
-    let (origin, direction) = placed(first.affine, &first.grid);
+    let corner = usize::from(first.is_of_nodes);
+    let volume = &first.components[0];
+    let [nx, ny, nz] = volume.grid.n.map(|n| n - corner);
+    let [sx, sy, sz] = volume.grid.spacing_mm;
+    let (mut origin, direction) = placed(volume.affine, &volume.grid);
+    if first.is_of_nodes {
+        let rows = volume.affine.unwrap_or_default();
+        origin = rows.map(|row| row[3]);
+    }
     let list = |v: &[f64]| v.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
     let extent = format!("0 {nx} 0 {ny} 0 {nz}");
     let mut head = format!(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" \
          header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n\
          <ImageData WholeExtent=\"{extent}\" Origin=\"{}\" Spacing=\"{}\" Direction=\"{}\">\n\
-         <Component Extent=\"{extent}\">\n<CellData>\n",
+         <Piece Extent=\"{extent}\">\n",
         list(&origin),
         list(&[sx, sy, sz]),
         list(&direction),
     );
+    let mut blocks = Vec::new();
     let mut offset = 0;
-    for ((name, _), block) in arrays.iter().zip(&blocks) {
-        head += &format!(
-            "<DataArray type=\"Float32\" Name=\"{name}\" format=\"appended\" offset=\"{offset}\"/>\n"
-        );
-        offset += block.len();
+    for (kind, of_nodes) in [("PointData", true), ("CellData", false)] {
+        head += &format!("<{kind}>\n");
+        for array in arrays.iter().filter(|a| a.is_of_nodes == of_nodes) {
+            let block = compressed(array.components);
+            head += &element(array, offset);
+            offset += block.len();
+            blocks.push(block);
+        }
+        head += &format!("</{kind}>\n");
     }
-    head += "</CellData>\n</Component>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_";
+    head += "</Piece>\n</ImageData>\n<AppendedData encoding=\"raw\">\n_";
     atomic::write_with(path, |out| {
         out.write_all(head.as_bytes())?;
         blocks.iter().try_for_each(|block| out.write_all(block))?;
         out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
     })
+}
+
+/// The head of an array whose data lie at `offset`.
+fn element(array: &Array, offset: usize) -> String {
+    let names = array.labels.iter().enumerate();
+    let names: String = names
+        .map(|(i, label)| format!(" ComponentName{i}=\"{label}\""))
+        .collect();
+    format!(
+        "<!-- {}: {} -->\n<DataArray type=\"Float32\" Name=\"{}\" NumberOfComponents=\"{}\"{names} format=\"appended\" offset=\"{offset}\"/>\n",
+        array.name,
+        array.about,
+        array.name,
+        array.components.len()
+    )
 }
 
 /// The outer corner of the first voxel and the axes' directions, row by row.
@@ -62,12 +99,12 @@ fn placed(affine: Option<[[f64; 4]; 3]>, grid: &Grid) -> ([f64; 3], [f64; 9]) {
     )
 }
 
-/// Number of blocks, their size, the last one's, each one's compressed size; then the blocks.
-fn compressed(volume: &Volume<f32>) -> Vec<u8> {
-    let bytes: Vec<u8> = volume
-        .as_slice()
-        .iter()
-        .flat_map(|v| v.to_le_bytes())
+/// Number of blocks, their size, the last one's, each one's compressed size; then the blocks. Components vary fastest.
+fn compressed(components: &[Volume<f32>]) -> Vec<u8> {
+    let values: Vec<&[f32]> = components.iter().map(Volume::as_slice).collect();
+    let bytes: Vec<u8> = (0..values[0].len())
+        .flat_map(|v| values.iter().map(move |component| component[v]))
+        .flat_map(f32::to_le_bytes)
         .collect();
     let blocks: Vec<Vec<u8>> = bytes
         .chunks(BLOCK)

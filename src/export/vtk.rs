@@ -48,10 +48,16 @@ pub fn write_fields(path: &Path, title: &str, fields: &SiteFields) -> Result<()>
             out.write_all(&site.to_be_bytes())?;
         }
         writeln!(out, "\nPOINT_DATA {sites}")?;
-        if let Some(u) = &fields.displacement_mm {
-            writeln!(out, "VECTORS displacement_mm float")?;
-            write_floats(out, u.as_flattened())?;
-            writeln!(out)?;
+        let vectors = [
+            ("displacement_mm", &fields.displacement_mm),
+            ("nodal_force_n", &fields.force_n),
+        ];
+        for (name, values) in vectors {
+            if let Some(values) = values {
+                writeln!(out, "VECTORS {name} float")?;
+                write_floats(out, values.as_flattened())?;
+                writeln!(out)?;
+            }
         }
         for (name, values) in scalars {
             if let Some(values) = values {

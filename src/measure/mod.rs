@@ -2,10 +2,12 @@
 
 pub mod apparent;
 pub mod distance;
+pub mod distribution;
 pub mod edge_blur;
 pub mod fabric;
 pub mod morphometry;
 pub mod pistoia;
+pub mod principal;
 #[cfg(test)]
 mod specimens;
 pub mod spheres;

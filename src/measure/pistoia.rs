@@ -1,7 +1,8 @@
 //! Owns Pistoia's criterion: the load at which a share of the bone exceeds a strain.
 //!
 //! Source: Pistoia et al. 2002, Bone 30:842: bone fails when 2 % of its tissue has an effective strain `√(2 SED / E)`
-//! above 0.007. The model is linear, so its load is scaled to there.
+//! above 0.007. The model is linear, so its load is scaled to there. The two numbers belong to strain energy densities of the
+//! strain at each element's centre.
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -26,11 +27,15 @@ impl Default for Pistoia {
 /// What the criterion says of a solved specimen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Failure {
+    pub criterion: Pistoia,
+    /// Effective strain that the critical volume exceeds under the load applied.
+    pub strain_at_volume: f64,
     /// Of the load applied.
     pub factor: f64,
-    /// Reaction at failure, a magnitude in N.
-    pub load_n: f64,
 }
+
+/// Critical volumes of the table that the field prints, besides the one asked for.
+pub const TABLE: [f64; 7] = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07];
 
 impl Pistoia {
     pub fn check(&self) -> Result<()> {
@@ -48,43 +53,82 @@ impl Pistoia {
         ))
     }
 
-    /// `strains` are effective strains, each with the bone volume that has it; `reaction_n` is the force of the load that
-    /// made them. None where nothing is strained.
-    pub fn failure(&self, mut strains: Vec<(f32, f32)>, reaction_n: f64) -> Option<Failure> {
+    /// The criterion at its own volume and, at the same strain, at those of [`TABLE`], by rising volume. `strains` are effective
+    /// strains, each with the bone volume that has it. Empty where nothing is strained.
+    pub fn failures(&self, mut strains: Vec<(f32, f32)>) -> Vec<Failure> {
         strains.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
         let sum: f64 = strains.iter().map(|s| f64::from(s.1)).sum();
-        // A hair less, so that a volume that is met exactly counts as met.
-        let wanted = self.critical_volume * sum * (1.0 - 1e-9);
-        let mut above = 0.0;
-        let strain = strains.iter().find_map(|&(strain, volume)| {
-            above += f64::from(volume);
-            (above >= wanted).then_some(f64::from(strain))
-        })?;
-        let factor = self.critical_strain / strain;
-        factor.is_finite().then_some(Failure {
-            factor,
-            load_n: factor * reaction_n.abs(),
-        })
+        let mut volumes = TABLE.to_vec();
+        if !volumes.contains(&self.critical_volume) {
+            volumes.push(self.critical_volume);
+            volumes.sort_by(f64::total_cmp);
+        }
+        let of = |volume: f64| {
+            // A hair less, so that a volume that is met exactly counts as met.
+            let strain = exceeded(&strains, volume * sum * (1.0 - 1e-9))?;
+            let factor = self.critical_strain / strain;
+            factor.is_finite().then_some(Failure {
+                criterion: Pistoia {
+                    critical_volume: volume,
+                    ..*self
+                },
+                strain_at_volume: strain,
+                factor,
+            })
+        };
+        volumes.into_iter().filter_map(of).collect()
     }
+}
+
+/// The strain at which the volume of falling `strains` reaches `volume`.
+fn exceeded(strains: &[(f32, f32)], volume: f64) -> Option<f64> {
+    let mut above = 0.0;
+    strains.iter().find_map(|&(strain, part)| {
+        above += f64::from(part);
+        (above >= volume).then_some(f64::from(strain))
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn own(strains: Vec<(f32, f32)>) -> Option<Failure> {
+        let failures = Pistoia::default().failures(strains);
+        let own = |f: &Failure| f.criterion == Pistoia::default();
+        failures.into_iter().find(own)
+    }
+
     #[test]
     fn the_strain_that_the_critical_volume_exceeds_scales_the_load() {
         // A hundred voxels strained 0.0001 to 0.01: two of them reach 0.0099.
         let strains: Vec<(f32, f32)> = (1..=100).map(|i| (i as f32 * 1e-4, 1.0)).collect();
-        let failure = Pistoia::default().failure(strains.clone(), -50.0).unwrap();
+        let failure = own(strains.clone()).unwrap();
         assert!((failure.factor / (0.007 / 0.0099) - 1.0).abs() < 1e-6);
-        assert!((failure.load_n - 50.0 * failure.factor).abs() < 1e-9);
         // Half a voxel counts by half.
         let halves = strains
             .iter()
             .flat_map(|&(s, _)| [(s, 0.5), (s, 0.5)])
             .collect();
-        assert_eq!(Pistoia::default().failure(halves, -50.0).unwrap(), failure);
-        assert!(Pistoia::default().failure(vec![(0.0, 1.0)], 1.0).is_none());
+        assert_eq!(own(halves), Some(failure));
+        assert!(own(vec![(0.0, 1.0)]).is_none());
+    }
+
+    #[test]
+    fn the_table_has_the_usual_volumes_and_the_one_asked_for() {
+        let strains: Vec<(f32, f32)> = (1..=1000).map(|i| (i as f32 * 1e-5, 1.0)).collect();
+        let criterion = Pistoia {
+            critical_volume: 0.035,
+            critical_strain: 0.005,
+        };
+        let table = criterion.failures(strains);
+        let volumes: Vec<f64> = table.iter().map(|f| f.criterion.critical_volume).collect();
+        assert_eq!(volumes, [0.01, 0.02, 0.03, 0.035, 0.04, 0.05, 0.06, 0.07]);
+        for f in &table {
+            // The most strained thousandths, counted from the top.
+            let wanted = 1e-5 * (1001.0 - 1000.0 * f.criterion.critical_volume);
+            assert!((f.strain_at_volume / wanted - 1.0).abs() < 1e-6, "{f:?}");
+            assert!((f.factor * f.strain_at_volume / 0.005 - 1.0).abs() < 1e-12);
+        }
     }
 }

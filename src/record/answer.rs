@@ -33,17 +33,24 @@ pub struct Answer {
     pub stiffness_n_per_mm: Option<f64>,
     pub force_n: Option<f64>,
     pub failure_load_n: Option<f64>,
+    /// Of bending and torsion.
+    #[serde(default)]
+    pub angle_deg: Option<f64>,
+    #[serde(default)]
+    pub moment_nmm: Option<f64>,
+    #[serde(default)]
+    pub failure_moment_nmm: Option<f64>,
     /// What a reader must know of the number.
     pub note: Option<String>,
     /// Of all rows of the condition together.
     pub wall_s: Option<f64>,
 }
 
-/// The answer of the rows of one command; None where none has a modulus.
+/// The answer of the rows of one command; None where none has a modulus, force or moment.
 pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
     let solved: Vec<&Row> = rows
         .iter()
-        .filter(|row| row.e_app_mpa().is_some())
+        .filter(|row| row.load_carried().is_some())
         .collect();
     let condition = shared(&solved)?;
     let own = || {
@@ -51,9 +58,7 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
             .iter()
             .filter(|row| Condition::of(&row.key) == condition)
     };
-    let failure = own()
-        .filter_map(|row| row.solved.as_ref()?.failure)
-        .next_back();
+    let failure = own().filter_map(|row| row.failure()?.load_n).next_back();
     let AnswerLine {
         scan,
         subject,
@@ -71,6 +76,9 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         force_n,
         failure_load_n,
         note,
+        angle_deg,
+        moment_nmm,
+        failure_moment_nmm,
         ..
     } = line(best(own().copied())?, facts);
     let wall_s = own()
@@ -97,7 +105,10 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         threshold_sensitivity,
         stiffness_n_per_mm,
         force_n,
-        failure_load_n: failure_load_n.or(failure.map(|f| f.load_n)),
+        failure_load_n: failure_load_n.or(failure),
+        angle_deg,
+        moment_nmm,
+        failure_moment_nmm,
         note,
         wall_s: Some(wall_s.sum()),
     })

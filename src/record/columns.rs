@@ -2,9 +2,10 @@
 
 mod groups;
 
+use crate::record::detail_columns;
 use serde::Serialize;
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct Column {
     pub name: &'static str,
     /// Empty for words and counts.
@@ -19,12 +20,12 @@ pub struct File {
     pub columns: &'static [Column],
 }
 
-const fn column(name: &'static str, unit: &'static str, about: &'static str) -> Column {
+pub(super) const fn column(name: &'static str, unit: &'static str, about: &'static str) -> Column {
     Column { name, unit, about }
 }
 
 /// All files, in the order in which readers meet them.
-pub const FILES: [File; 7] = [
+pub const FILES: [File; 11] = [
     File {
         name: "answers.csv",
         about: "one row a scan: its apparent modulus with all of its stated error, by the row of the least stated error",
@@ -35,6 +36,10 @@ pub const FILES: [File; 7] = [
         about: "one row a solve, and rows that follow from several solves (boundary ffb, extrapolated)",
         columns: &RESULTS,
     },
+    detail_columns::REACTIONS,
+    detail_columns::FAILURE,
+    detail_columns::SECTIONS,
+    detail_columns::TISSUE,
     File {
         name: "groups.csv",
         about: "one row a quantity and group (in the report's folder)",
@@ -62,43 +67,103 @@ pub const FILES: [File; 7] = [
     },
 ];
 
-const SCAN: Column = column(
+pub(super) const SCAN: Column = column(
     "scan",
     "",
     "name of the scan: of its file, its folder, or in the manifest",
 );
+pub(super) const METHOD: Column = column("method", "", "lattice or voxel-fe");
+pub(super) const STRUCTURE: Column = column(
+    "structure",
+    "",
+    "sc, bcc, fcc (lattices) or hex8 (voxel elements)",
+);
+pub(super) const BOUNDARY: Column = column(
+    "boundary",
+    "",
+    "how a lattice meets the bone's surface: floppy, firm, graded; ffb: mean of floppy and firm; extrapolated: limit of several resolutions",
+);
+pub(super) const LP: Column = column(
+    "lp_mm",
+    "mm",
+    "lattice parameter; of voxel-fe the element size",
+);
 const BV_TV: Column = column("bv_tv", "", "bone volume fraction, 0 to 1");
-const YOUNG: Column = column(
+pub(super) const YOUNG: Column = column(
     "young_mpa",
     "MPa",
     "Young's modulus of the bone tissue; with `material` the bone's mean",
 );
-const POISSON: Column = column("poisson", "", "Poisson's ratio of the bone tissue");
-const LOAD: Column = column(
+pub(super) const POISSON: Column = column("poisson", "", "Poisson's ratio of the bone tissue");
+pub(super) const LOAD: Column = column(
     "load",
     "",
-    "uniaxial (sides free), confined (sides held), stiffness (six unit strains)",
+    "uniaxial (sides free), confined (sides held), stiffness (six unit strains); shear-x (direction), bending-x (axis of the tilt), torsion: both ends held in all components",
 );
-const ENDS: Column = column(
+pub(super) const ENDS: Column = column(
     "ends",
     "",
-    "free: loaded ends slide sideways; bonded: they do not; of load stiffness: kinematic or mixed faces",
+    "free: loaded ends slide sideways; bonded: they do not; of load stiffness: kinematic, mixed or symshear faces",
 );
-const AXIS: Column = column("axis", "", "axis along which the specimen is compressed");
-const GRIP: Column = column(
+pub(super) const AXIS: Column = column("axis", "", "the long axis: that of compression, from end to end");
+pub(super) const GRIP: Column = column(
     "grip_mm",
     "mm",
     "thickness that moves as a rigid plate at each end; 0: end planes only",
 );
 const GROUP: Column = column("group", "", "from the manifest");
 const SUBJECT: Column = column("subject", "", "from the manifest: who the scan is of");
-const FAILURE_LOAD: Column = column(
+pub(super) const FAILURE_LOAD: Column = column(
     "failure_load_n",
     "N",
-    "force at failure by Pistoia's criterion, a magnitude; where --failure asks for it",
+    "force at failure by Pistoia's criterion, a magnitude; where --failure asks for it; NA under bending and torsion",
 );
 
-const ANSWERS: [Column; 22] = [
+pub(super) const STRAIN: Column = column(
+    "strain",
+    "",
+    "nominal strain; negative is compression. 0 under bending and torsion",
+);
+pub(super) const ANGLE: Column = column(
+    "angle_deg",
+    "°",
+    "by how much the ends turn against each other under bending and torsion",
+);
+const STIFFNESS: Column = column(
+    "stiffness_n_per_mm",
+    "N/mm",
+    "force over the displacement of the ends; of compression E_app A / L. NA under bending and torsion",
+);
+pub(super) const FORCE: Column = column(
+    "force_n",
+    "N",
+    "force of the moved end along its displacement at the strain applied, a magnitude",
+);
+pub(super) const MOMENT: Column = column(
+    "moment_nmm",
+    "N mm",
+    "moment of the moved end about the axis of its turn, a magnitude; of bending the mean of both ends. NA otherwise",
+);
+pub(super) const FAILURE_MOMENT: Column = column(
+    "failure_moment_nmm",
+    "N mm",
+    "moment at failure by Pistoia's criterion, a magnitude; of bending and torsion",
+);
+pub(super) const FAILURE_FACTOR: &str = "what the load applied is multiplied by to fail";
+pub(super) const FAILURE_DISPLACEMENT: Column = column(
+    "failure_displacement_mm",
+    "mm",
+    "displacement of the ends at failure, a magnitude",
+);
+pub(super) const FAILURE_STRAIN: Column =
+    column("failure_strain", "", "nominal strain at failure, a magnitude");
+pub(super) const SED: Column = column(
+    "sed",
+    "",
+    "strain energy density of elements, of which effective strains and failure follow: centre (of the strain at the centre) or mean (energy over volume)",
+);
+
+const ANSWERS: [Column; 25] = [
     SCAN,
     SUBJECT,
     GROUP,
@@ -135,12 +200,8 @@ const ANSWERS: [Column; 22] = [
     ENDS,
     AXIS,
     GRIP,
-    column(
-        "stiffness_n_per_mm",
-        "N/mm",
-        "force over the displacement of the ends, E_app A / L",
-    ),
-    column("force_n", "N", "force at the strain applied, a magnitude"),
+    STIFFNESS,
+    FORCE,
     FAILURE_LOAD,
     column(
         "yield_stress_mpa",
@@ -153,26 +214,17 @@ const ANSWERS: [Column; 22] = [
         "relative change of e_app_mpa per relative change of BV, where it was estimated",
     ),
     column("note", "", "what a reader must know of this number"),
+    ANGLE,
+    MOMENT,
+    FAILURE_MOMENT,
 ];
 
-const RESULTS: [Column; 47] = [
+const RESULTS: [Column; 56] = [
     SCAN,
-    column("method", "", "lattice or voxel-fe"),
-    column(
-        "structure",
-        "",
-        "sc, bcc, fcc (lattices) or hex8 (voxel elements)",
-    ),
-    column(
-        "boundary",
-        "",
-        "how a lattice meets the bone's surface: floppy, firm, graded; ffb: mean of floppy and firm; extrapolated: limit of several resolutions",
-    ),
-    column(
-        "lp_mm",
-        "mm",
-        "lattice parameter; of voxel-fe the element size",
-    ),
+    METHOD,
+    STRUCTURE,
+    BOUNDARY,
+    LP,
     column("registration", "mm", "shift of the lattice, x;y;z"),
     column("voxel_mm", "mm", "voxel edge; x;y;z where they differ"),
     YOUNG,
@@ -180,7 +232,7 @@ const RESULTS: [Column; 47] = [
     LOAD,
     ENDS,
     AXIS,
-    column("strain", "", "nominal strain; negative is compression"),
+    STRAIN,
     GRIP,
     column("tv_definition", "", "what TV is: box, cylinder, mask"),
     column("tv_mm3", "mm³", "volume of interest, pores included"),
@@ -254,11 +306,7 @@ const RESULTS: [Column; 47] = [
         "law by which tissue differs from voxel to voxel",
     ),
     FAILURE_LOAD,
-    column(
-        "failure_factor",
-        "",
-        "what the load applied is multiplied by to fail",
-    ),
+    column("failure_factor", "", FAILURE_FACTOR),
     column(
         "tb_th_mm",
         "mm",
@@ -291,6 +339,19 @@ const RESULTS: [Column; 47] = [
         "",
         "relative change of E_app per relative change of bone volume",
     ),
+    ANGLE,
+    STIFFNESS,
+    FORCE,
+    MOMENT,
+    column(
+        "algebraic_error_percent",
+        "%",
+        "estimated error that the solver left in e_app_mpa, stiffness, force and moment",
+    ),
+    FAILURE_MOMENT,
+    FAILURE_DISPLACEMENT,
+    FAILURE_STRAIN,
+    SED,
 ];
 
 const FAILED: [Column; 3] = [
@@ -305,10 +366,12 @@ const HISTORY: [Column; 1] = [column("t", "", "time of the scene, in its own uni
 mod tests {
     use super::*;
     use crate::io::table::to_csv;
+    use crate::record::details::Line;
     use crate::record::failures::Failure;
     use crate::record::stiffness::StiffnessLine;
     use crate::report::groups::{ComparisonLine, GroupLine};
     use crate::result::answer::AnswerLine;
+    use crate::result::details::{EndForces, FailureAt, SectionShare, TissueSpread};
     use crate::result::row::Row;
     use std::collections::BTreeSet;
 
@@ -322,6 +385,10 @@ mod tests {
             ("groups.csv", to_csv::<GroupLine>(&[])),
             ("comparisons.csv", to_csv::<ComparisonLine>(&[])),
             ("stiffness.csv", to_csv::<StiffnessLine>(&[])),
+            ("reactions.csv", to_csv::<Line<EndForces>>(&[])),
+            ("failure.csv", to_csv::<Line<FailureAt>>(&[])),
+            ("sections.csv", to_csv::<Line<SectionShare>>(&[])),
+            ("tissue.csv", to_csv::<Line<TissueSpread>>(&[])),
         ] {
             let file = FILES.iter().find(|f| f.name == name).unwrap();
             let described: Vec<&str> = file.columns.iter().map(|c| c.name).collect();
@@ -345,6 +412,8 @@ mod tests {
                 ("_n", "N"),
                 ("_s", "s"),
                 ("_mib", "MiB"),
+                ("_nmm", "N mm"),
+                ("_deg", "°"),
             ];
             let per = name.contains("_per_");
             if let Some((_, expected)) = by_name.iter().find(|(end, _)| name.ends_with(end) && !per)

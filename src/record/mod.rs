@@ -3,6 +3,8 @@
 pub mod answer;
 pub mod collect_rows;
 pub mod columns;
+pub mod detail_columns;
+pub mod details;
 pub mod error_target_note;
 pub mod failures;
 pub mod history;

@@ -7,9 +7,11 @@ use crate::io::{atomic, table};
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::pipeline::apparent::SolveParams;
-use crate::record::specimen;
+use crate::record::{details, specimen};
 use crate::result::derived::with_derived;
+use crate::result::details::Details;
 use crate::result::row::Row;
+use crate::result::settings::Settings;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -41,6 +43,13 @@ pub fn set_aside_stale(dir: &Path, session: &Session) {
             dir.display()
         ));
     }
+}
+
+/// Settings and details of the solves in `dir`; empty where there are none.
+pub fn details(dir: &Path) -> Vec<(Settings, Details)> {
+    let rows = Record::read(dir).map_or(Vec::new(), |record| record.rows);
+    let of = |keyed: KeyedRow| (keyed.row.key, keyed.details);
+    rows.into_iter().map(of).collect()
 }
 
 /// Writes `results.csv`; an older one that was set aside goes.
@@ -81,6 +90,12 @@ struct KeyedRow {
     key: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     settings: Option<SolveParams>,
+    #[serde(default, skip_serializing_if = "is_empty")]
+    details: Details,
+}
+
+fn is_empty(details: &Details) -> bool {
+    *details == Details::default()
 }
 
 /// The rows of one scan's folder.
@@ -125,12 +140,19 @@ impl Results {
             .map(|old| old.row.clone())
     }
 
-    /// Stores a solved row, in place of an older one of the same settings, and writes both files.
-    pub fn store(&mut self, blank: &Row, params: &SolveParams, row: &Row) -> Result<()> {
+    /// Stores a solved row with its details, in place of an older one of the same settings, and writes all files.
+    pub fn store(
+        &mut self,
+        blank: &Row,
+        params: &SolveParams,
+        row: &Row,
+        details: Details,
+    ) -> Result<()> {
         let mut new = KeyedRow {
             row: row.clone(),
             key: Some(key(blank, params)),
             settings: Some(params.clone()),
+            details,
         };
         if let Some(KeyedRow { row: old, .. }) = self.record.rows.first() {
             (new.row.marks.group, new.row.marks.subject) =
@@ -199,6 +221,7 @@ impl Results {
                 row: row.clone(),
                 key: None,
                 settings: None,
+                details: Details::default(),
             },
             false => solved
                 .next()
@@ -211,6 +234,8 @@ impl Results {
         };
         let text = serde_json::to_string_pretty(&record).expect("plain data");
         atomic::write(&self.dir.join(RECORD), text)?;
+        let details = self.record.rows.iter();
+        details::write(&self.dir, details.map(|keyed| (&keyed.row.key, &keyed.details)))?;
         write_table(&self.dir, &rows)
     }
 }
@@ -257,7 +282,7 @@ fn key(blank: &Row, params: &SolveParams) -> String {
 mod tests {
     use super::*;
     use crate::result::row::Solution;
-    use crate::result::settings::{BoundaryRule, Settings};
+    use crate::result::settings::BoundaryRule;
 
     const FIRM: BoundaryRule = BoundaryRule::FIRM;
     const FLOPPY: BoundaryRule = BoundaryRule::FLOPPY;
@@ -295,10 +320,10 @@ mod tests {
         let params = SolveParams::default();
         let mut results = Results::open(dir.path(), false).unwrap();
         results
-            .store(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0))
+            .store(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0), Details::default())
             .unwrap();
         results
-            .store(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1))
+            .store(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1), Details::default())
             .unwrap();
 
         let again = Results::open(dir.path(), false).unwrap();
@@ -337,10 +362,10 @@ mod tests {
         let mut results = Results::open(dir.path(), false).unwrap();
         let mut stalled = solved(FIRM, 2.0);
         stalled.solved.as_mut().unwrap().converged = Some(false);
-        results.store(&blank(FIRM), &params, &stalled).unwrap();
+        results.store(&blank(FIRM), &params, &stalled, Details::default()).unwrap();
         assert_eq!(results.find(&blank(FIRM), &params), None);
         results
-            .store(&blank(FIRM), &params, &solved(FIRM, 1.0))
+            .store(&blank(FIRM), &params, &solved(FIRM, 1.0), Details::default())
             .unwrap();
         let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
         assert_eq!(table, [solved(FIRM, 1.0)]);

@@ -21,7 +21,7 @@ pub struct Answers {
 
 /// The answers of `rows`; `facts` has what is known of a scan.
 pub fn answers(rows: &[Row], facts: impl Fn(&str) -> ScanFacts) -> Answers {
-    let solved: Vec<&Row> = rows.iter().filter(|r| r.e_app_mpa().is_some()).collect();
+    let solved: Vec<&Row> = rows.iter().filter(|r| r.load_carried().is_some()).collect();
     let Some(condition) = shared(&solved) else {
         return Answers::default();
     };
@@ -125,7 +125,9 @@ pub fn table(answers: &Answers) -> Table {
         "conditions",
         "stiffness (N/mm)",
         "force (N)",
+        "moment (N mm)",
         "failure load (N)",
+        "failure moment (N mm)",
         "yield stress (MPa)",
     ];
     let body = answers.lines.iter().map(|line| cells(line, answers));
@@ -155,7 +157,9 @@ fn cells(line: &AnswerLine, answers: &Answers) -> Vec<Cell> {
         }),
         number(line.stiffness_n_per_mm),
         number(line.force_n),
+        number(line.moment_nmm),
         number(line.failure_load_n),
+        number(line.failure_moment_nmm),
         number(line.yield_stress_mpa),
     ]
 }
@@ -180,6 +184,7 @@ pub fn comparable(answers: &Answers) -> (Vec<&AnswerLine>, Vec<String>) {
         }
         match line.e_app_mpa {
             Some(e) if e > 0.0 => kept.push(line),
+            None if line.force_n.or(line.moment_nmm).is_some_and(|f| f > 0.0) => {}
             _ => notes.push(format!(
                 "{} carries no load (E_app 0): left out of groups and figures",
                 line.scan

@@ -23,6 +23,8 @@ pub struct ScanPage {
     pub facts: Vec<(String, String)>,
     /// Apparent stiffness, where it was asked for: conditions in words, matrix, constants.
     pub stiffness: Option<ShownStiffness>,
+    /// Further tables, each with its caption: failure, sections, tissue.
+    pub tables: Vec<(String, Table)>,
     /// Files of fields, curves and models in the scan's folder.
     pub files: Vec<String>,
 }
@@ -58,6 +60,7 @@ struct Page<'a> {
     pictures: Vec<Picture<'a>>,
     facts: &'a [(String, String)],
     stiffness: &'a Option<ShownStiffness>,
+    tables: &'a [(String, Table)],
     files: &'a [String],
     figures: Vec<Shown<'a>>,
 }
@@ -133,6 +136,7 @@ fn shown_page<'a>(page: &'a ScanPage, figures: &[&'a Figure]) -> Page<'a> {
             .collect(),
         facts: &page.facts,
         stiffness: &page.stiffness,
+        tables: &page.tables,
         files: &page.files,
         figures: own.map(|f| shown(f)).collect(),
     }

@@ -34,6 +34,10 @@ pub struct AnswerLine {
     pub yield_stress_mpa: Option<f64>,
     pub threshold_sensitivity: Option<f64>,
     pub note: Option<String>,
+    /// Of bending and torsion.
+    pub angle_deg: Option<f64>,
+    pub moment_nmm: Option<f64>,
+    pub failure_moment_nmm: Option<f64>,
 }
 
 /// What is known of a scan apart from its rows.
@@ -69,7 +73,7 @@ fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
     )
 }
 
-/// The row that answers; None where none has a modulus. Rows that show only what a coarser image would change do not answer.
+/// The row that answers; None where none has a modulus, force or moment. Rows that show only what a coarser image would change do not answer.
 pub fn best<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<&'a Row> {
     let order = |a: &&Row, b: &&Row| {
         let (a, b) = (rank(a), rank(b));
@@ -80,7 +84,7 @@ pub fn best<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<&'a Row> {
             .then(a.4.total_cmp(&b.4))
     };
     let answers =
-        |row: &&Row| row.e_app_mpa().is_some() && row.key.elements != Some(Elements::SmoothedGrey);
+        |row: &&Row| row.load_carried().is_some() && row.key.elements != Some(Elements::SmoothedGrey);
     rows.into_iter().filter(answers).min_by(order)
 }
 
@@ -95,9 +99,13 @@ pub fn method_name(row: &Row) -> String {
     }
 }
 
-/// Force at the strain applied, a magnitude, and stiffness of the specimen between its loaded ends: `F = E A ε`,
-/// `K = E A / L`. None for a stiffness matrix, or where the size is not known.
+/// Force at the strain applied, a magnitude, and stiffness of the specimen between its loaded ends: the row's own, or
+/// `F = E A ε`, `K = E A / L` of its modulus. None for a stiffness matrix, or where the size is not known.
 fn force_and_stiffness(row: &Row, facts: &ScanFacts) -> Option<[f64; 2]> {
+    let solved = row.solved.as_ref()?;
+    if let Some((force, stiffness)) = solved.force_n.zip(solved.stiffness_n_per_mm) {
+        return Some([force, stiffness]);
+    }
     let key = &row.key;
     let height_mm = facts.size_mm?[key.axis.index()];
     let gauge_mm = height_mm - 2.0 * key.grip_mm;
@@ -140,14 +148,13 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         grip_mm: key.grip_mm,
         stiffness_n_per_mm: forces.map(|[_, k]| k),
         force_n: forces.map(|[f, _]| f),
-        failure_load_n: row
-            .solved
-            .as_ref()
-            .and_then(|s| s.failure)
-            .map(|f| f.load_n),
+        failure_load_n: row.failure().and_then(|f| f.load_n),
         yield_stress_mpa: None,
         threshold_sensitivity: row.solved.as_ref().and_then(|s| s.threshold_sensitivity),
         note,
+        angle_deg: key.angle_deg,
+        moment_nmm: row.solved.as_ref().and_then(|s| s.moment_nmm),
+        failure_moment_nmm: row.failure().and_then(|f| f.moment_nmm),
     }
 }
 
@@ -167,7 +174,7 @@ pub fn answers(
     let answer = |scan: &str| {
         let of_scan = || rows.iter().filter(move |row| row.key.scan == scan);
         let has = |c: &Condition| {
-            of_scan().any(|r| Condition::of(&r.key) == *c && r.e_app_mpa().is_some())
+            of_scan().any(|r| Condition::of(&r.key) == *c && r.load_carried().is_some())
         };
         let last = of_scan().next_back().map(|row| Condition::of(&row.key))?;
         let used = if has(condition) { condition } else { &last };
@@ -175,7 +182,7 @@ pub fn answers(
             .filter(|r| Condition::of(&r.key) == *used)
             .collect();
         let mut answer = line(best(own.iter().copied())?, &facts(scan));
-        if answer.e_app_mpa == Some(0.0) {
+        if answer.e_app_mpa.or(answer.force_n).or(answer.moment_nmm) == Some(0.0) {
             let mut said = own
                 .iter()
                 .flat_map(|r| notes::parts(r.marks.note.as_deref()));
@@ -184,10 +191,8 @@ pub fn answers(
                 notes::add(&mut answer.note, why);
             }
         }
-        let mut failure = own.iter().filter_map(|r| r.solved.as_ref()?.failure);
-        answer.failure_load_n = answer
-            .failure_load_n
-            .or(failure.next_back().map(|f| f.load_n));
+        let mut failure = own.iter().filter_map(|r| r.failure()?.load_n);
+        answer.failure_load_n = answer.failure_load_n.or(failure.next_back());
         Some(answer)
     };
     scans.into_iter().filter_map(answer).collect()

@@ -2,7 +2,7 @@
 
 use crate::grid::Axis;
 use crate::result::row::Row;
-use crate::result::settings::{Conditions, Ends, Load, Settings, Supports};
+use crate::result::settings::{Conditions, Ends, Load, Motion, Settings, Supports};
 
 /// What was done to a specimen, and of what tissue.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,6 +11,8 @@ pub struct Condition {
     pub supports: Supports,
     pub axis: Axis,
     pub strain: f64,
+    /// Of bending and torsion.
+    pub angle_deg: Option<f64>,
     pub grip_mm: f64,
     pub poisson: f64,
     pub tissue: Tissue,
@@ -34,6 +36,7 @@ impl Condition {
             supports: key.supports,
             axis: key.axis,
             strain: key.strain,
+            angle_deg: key.angle_deg,
             grip_mm: key.grip_mm,
             poisson: key.poisson,
             tissue: match &key.material {
@@ -55,6 +58,9 @@ impl Condition {
                 "Six unit strains under {}; E_app is Young's modulus along {axis} of the stiffness matrix.",
                 faces.in_words()
             );
+        }
+        if let Some(words) = self.motion_in_words() {
+            return words;
         }
         let direction = match self.strain < 0.0 {
             true => "Compression",
@@ -79,6 +85,34 @@ impl Condition {
             "{direction} by {} % along {axis}: {grips} and are {ends}; {sides}.",
             rounded(100.0 * self.strain.abs())
         )
+    }
+
+    /// Shear, bending or torsion in a sentence.
+    fn motion_in_words(&self) -> Option<String> {
+        let (axis, angle) = (self.axis.name(), self.angle_deg.unwrap_or_default());
+        let how = match self.load.motion()? {
+            Motion::Along => return None,
+            Motion::Sideways(direction) => format!(
+                "Shear: the upper end moves along {} by {} % of the height along {axis}",
+                direction.name(),
+                rounded(100.0 * self.strain)
+            ),
+            Motion::Tilt(about) => format!(
+                "Bending about {}: both end planes across {axis} tilt by {}°, opposite ways",
+                about.name(),
+                rounded(0.5 * angle)
+            ),
+            Motion::Turn => format!(
+                "Torsion: the upper end turns by {angle}° about {axis} through the middle of the grid"
+            ),
+        };
+        let grips = match self.grip_mm > 0.0 {
+            true => format!(" (grips of {} mm)", self.grip_mm),
+            false => String::new(),
+        };
+        Some(format!(
+            "{how}; both ends are held in all components{grips}; the sides are free."
+        ))
     }
 
     /// The tissue in a sentence.
@@ -126,6 +160,13 @@ impl Condition {
             format!("strain {}", self.strain),
         );
         say(
+            self.angle_deg != other.angle_deg,
+            match self.angle_deg {
+                Some(angle) => format!("angle {angle}°"),
+                None => "no angle".to_owned(),
+            },
+        );
+        say(
             self.grip_mm != other.grip_mm,
             format!("grips of {} mm", self.grip_mm),
         );
@@ -141,7 +182,8 @@ impl Condition {
     }
 }
 
-/// The condition that most scans share; of several the one of the last rows, which the last command solved. None without rows.
+/// The condition that most scans share; of several one with an apparent modulus, then the one of the last rows, which the last
+/// command solved. None without rows.
 pub fn shared(rows: &[&Row]) -> Option<Condition> {
     let mut found: Vec<(Condition, Vec<&str>)> = Vec::new();
     for row in rows {
@@ -156,7 +198,9 @@ pub fn shared(rows: &[&Row]) -> Option<Condition> {
         let scans = scans.into_iter().chain((!known).then_some(scan));
         found.push((condition, scans.collect()));
     }
-    let most = found.into_iter().max_by_key(|(_, scans)| scans.len());
+    let most = found
+        .into_iter()
+        .max_by_key(|(condition, scans)| (scans.len(), condition.load.has_modulus()));
     most.map(|(condition, _)| condition)
 }
 

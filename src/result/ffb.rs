@@ -30,7 +30,9 @@ fn are_a_pair(a: &Row, b: &Row) -> bool {
     let one_of_each = [BoundaryRule::FIRM, BoundaryRule::FLOPPY]
         .into_iter()
         .all(|part| boundaries.contains(&Some(part)));
-    one_of_each && a.without_boundary() == b.without_boundary()
+    // Without a modulus there is no bracket of it.
+    let bracketed = one_of_each && a.load.has_modulus();
+    bracketed && a.without_boundary() == b.without_boundary()
 }
 
 /// The mean states no error where its parts are no bracket.

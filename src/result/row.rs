@@ -31,6 +31,13 @@ pub struct Solution {
     pub e_app_reaction_mpa: Option<f64>,
     pub e_app_stress_mpa: Option<f64>,
     pub algebraic_error_mpa: Option<f64>,
+    /// Of modulus, stiffness, force and moment alike, over their value.
+    pub algebraic_error_percent: Option<f64>,
+    /// Of the moved end, magnitudes: along its displacement, or about the axis of its turn (of bending the mean of both ends).
+    pub force_n: Option<f64>,
+    pub moment_nmm: Option<f64>,
+    /// Force over the displacement of the ends.
+    pub stiffness_n_per_mm: Option<f64>,
     pub discretization_error_mpa: Option<f64>,
     /// What voxels, and the blur of the scan, leave open about the bone's surface.
     pub shape_error_mpa: Option<f64>,
@@ -46,12 +53,17 @@ pub struct Solution {
     pub failure: Option<FailureLoad>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Failure; magnitudes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FailureLoad {
-    /// Magnitude of the reaction at failure.
-    pub load_n: f64,
     /// What the load is multiplied by.
     pub factor: f64,
+    /// None under bending and torsion.
+    pub load_n: Option<f64>,
+    /// None under forces.
+    pub moment_nmm: Option<f64>,
+    pub displacement_mm: Option<f64>,
+    pub strain: Option<f64>,
 }
 
 /// What is known of a row or of its specimen apart from the solve.
@@ -117,7 +129,21 @@ impl Row {
 
     /// Whether the model carries no load, be it that of the bone or not.
     pub fn carries_nothing(&self) -> bool {
-        self.e_app_mpa() == Some(0.0)
+        self.load_carried() == Some(0.0)
+    }
+
+    /// The number that answers the load: modulus, force in N or moment in N mm.
+    pub fn load_carried(&self) -> Option<f64> {
+        let solved = self.solved.as_ref()?;
+        let loads = solved.force_n.or(solved.moment_nmm);
+        match self.key.load.has_modulus() {
+            true => solved.e_app_mpa,
+            false => loads,
+        }
+    }
+
+    pub fn failure(&self) -> Option<FailureLoad> {
+        self.solved.as_ref()?.failure
     }
 
     /// Whether the model lost the path that the bone has, or has nothing to measure it by: its modulus of 0 is not the bone's.
@@ -157,8 +183,9 @@ mod tests {
                 sites: Some(7),
                 converged: Some(false),
                 failure: Some(FailureLoad {
-                    load_n: 2.5,
+                    load_n: Some(2.5),
                     factor: 0.5,
+                    ..FailureLoad::default()
                 }),
                 ..Solution::default()
             }),
@@ -186,7 +213,7 @@ mod tests {
             "{line}"
         );
         assert!(
-            line.ends_with(",2.5,0.5,NA,NA,NA,1.25,NA,NA,NA,NA"),
+            line.contains(",2.5,0.5,NA,NA,NA,1.25,NA,NA,NA,NA,"),
             "{line}"
         );
     }
@@ -212,7 +239,7 @@ mod tests {
             (
                 ",free,",
                 ",glued,",
-                "bonded, kinematic, mixed, found `glued`",
+                "bonded, kinematic, mixed, symshear, found `glued`",
             ),
             ("NA,0,0.0", "1;2,0,0.0", "registration"),
             ("method", "methods", "missing field `method`"),

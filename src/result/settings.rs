@@ -3,6 +3,7 @@
 use crate::discretisation::lattice::placement::Boundary;
 use crate::discretisation::lattice::stencil::Structure;
 use crate::grid::Axis;
+pub use crate::result::load::{Conditions, Ends, Load, Motion, Sed};
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
@@ -19,77 +20,6 @@ impl Method {
 
     pub fn name(self) -> &'static str {
         Method::WORDS[self as usize]
-    }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
-pub enum Load {
-    #[default]
-    Uniaxial,
-    /// Sides held against lateral motion.
-    Confined,
-    /// All six unit strains: the apparent stiffness matrix.
-    Stiffness,
-}
-
-impl Load {
-    pub fn name(self) -> &'static str {
-        match self {
-            Load::Uniaxial => "uniaxial",
-            Load::Confined => "confined",
-            Load::Stiffness => "stiffness",
-        }
-    }
-}
-
-/// What the gripped sites may do sideways.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
-pub enum Ends {
-    #[default]
-    Free,
-    Bonded,
-}
-
-impl Ends {
-    pub fn name(self) -> &'static str {
-        match self {
-            Ends::Free => "free",
-            Ends::Bonded => "bonded",
-        }
-    }
-}
-
-/// What unit strains do on the faces of the volume.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
-pub enum Conditions {
-    /// Every node on a face moves as the homogeneous strain says: an upper bound.
-    #[default]
-    Kinematic,
-    /// Periodicity-compatible mixed uniform conditions (Pahr & Zysset 2008): faces slide as those of an orthotropic
-    /// periodic cell do, close to what larger specimens show.
-    Mixed,
-}
-
-impl Conditions {
-    pub fn name(self) -> &'static str {
-        match self {
-            Conditions::Kinematic => "kinematic",
-            Conditions::Mixed => "mixed",
-        }
-    }
-
-    pub fn in_words(self) -> &'static str {
-        match self {
-            Conditions::Kinematic => {
-                "kinematic uniform boundary conditions (u = strain x on all faces; an upper bound)"
-            }
-            Conditions::Mixed => {
-                "periodicity-compatible mixed uniform boundary conditions (Pahr & Zysset 2008)"
-            }
-        }
     }
 }
 
@@ -242,7 +172,8 @@ words!(
         Supports::Ends(Ends::Free),
         Supports::Ends(Ends::Bonded),
         Supports::Faces(Conditions::Kinematic),
-        Supports::Faces(Conditions::Mixed)
+        Supports::Faces(Conditions::Mixed),
+        Supports::Faces(Conditions::Symshear)
     ]
 );
 
@@ -287,7 +218,10 @@ pub struct Settings {
     pub load: Load,
     pub supports: Supports,
     pub axis: Axis,
+    /// 0 under a load that an angle describes.
     pub strain: f64,
+    /// Of bending and torsion; None otherwise.
+    pub angle_deg: Option<f64>,
     /// 0 for end planes.
     pub grip_mm: f64,
     pub tv_definition: String,
@@ -297,6 +231,8 @@ pub struct Settings {
     pub tolerance: Option<f64>,
     /// The law by which tissue differs from voxel to voxel.
     pub material: Option<String>,
+    /// Which strain energy density is reported, and Pistoia's criterion reads. None for lattices.
+    pub sed: Option<Sed>,
 }
 
 impl Settings {
@@ -319,6 +255,7 @@ impl Settings {
             method: Method::default(),
             structure: CellType::default(),
             boundary: None,
+            sed: None,
             ..self.without_resolution()
         }
     }

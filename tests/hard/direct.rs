@@ -7,6 +7,7 @@ use bonepd_ct::par::dot;
 use bonepd_ct::pipeline::apparent::SolveParams;
 use bonepd_ct::pipeline::apparent::discretisation::Prepared;
 use bonepd_ct::pipeline::apparent::tissue::Tissue;
+use bonepd_ct::pipeline::apparent::motion::EndMotion;
 use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use bonepd_ct::pipeline::apparent::voxel_fe::supports;
 use bonepd_ct::solver::direct::DirectLlt;
@@ -21,8 +22,9 @@ pub fn e_app_mpa(specimen: &Specimen, params: &SolveParams) -> (f64, Probed) {
     assert!(!mesh.is_empty());
     let grips = Planes::within(&mesh.grid, params.axis, 0.0).unwrap();
     let length = specimen.length_mm(params.axis);
-    let held = supports::held(mesh, grips, params);
-    let mut u = supports::bar(mesh, grips, params.strain * length);
+    let motion = EndMotion::of(specimen, params, length);
+    let held = supports::held(mesh, grips, &motion, params.load);
+    let mut u = supports::start(mesh, grips, &motion);
     for (node, u) in u.iter_mut().enumerate() {
         (0..3)
             .filter(|&c| !held.is_held(node, c))

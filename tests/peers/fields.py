@@ -27,7 +27,7 @@ bone[:20, :, 10:] = 0
 nibabel.save(nibabel.Nifti1Image(bone, affine), work / "scan.nii.gz")
 out = work / "out"
 subprocess.run([program, "segment", work / "scan.nii.gz", "-o", out, "--lower", "1", "--quiet"], check=True)
-fields = "displacement,sed,von-mises,fraction"
+fields = "displacement,sed,von-mises,fraction,strain,stress,principal-strain,principal-stress,effective-strain,nodal-force"
 subprocess.run(
     [program, "solve", out, "--method", "voxel-fe", "--fields", fields, "--quiet"], check=True
 )
@@ -39,16 +39,43 @@ assert image.GetDimensions() == (71, 61, 81), image.GetDimensions()
 corner = affine[:3, 3] - 0.5 * numpy.diag(affine)[:3]
 assert numpy.allclose(image.GetOrigin(), corner, atol=1e-6), image.GetOrigin()
 assert numpy.allclose(image.GetSpacing(), [0.02, 0.02, 0.03], atol=1e-7), image.GetSpacing()
-data = image.GetCellData()
-names = [data.GetArrayName(i) for i in range(data.GetNumberOfArrays())]
-for name in names:
-    from_vtk = vtk_to_numpy(data.GetArray(name)).reshape(80, 60, 70).transpose(2, 1, 0)
-    nifti = nibabel.load(out / f"field-{name.replace('_', '-')}.nii.gz")
-    assert numpy.allclose(nifti.affine, affine, atol=1e-6), nifti.affine
-    assert numpy.array_equal(nifti.get_fdata(dtype=numpy.float32), from_vtk), name
-    assert not from_vtk[bone == 0].any(), name
-assert len(names) == 6, names
-print(f"{len(names)} fields: VTK and nibabel read the same values at the same place")
+cells = {"strain": 6, "stress_mpa": 6, "principal_strain": 3, "principal_stress_mpa": 3}
+cells |= {f"principal_{of}_direction_{k}": 3 for of in ("strain", "stress") for k in (1, 2, 3)}
+counts = []
+for data, size, shift, pores in (
+    (image.GetCellData(), (80, 60, 70), 0.0, True),
+    (image.GetPointData(), (81, 61, 71), -0.5, False),
+):
+    names = [data.GetArrayName(i) for i in range(data.GetNumberOfArrays())]
+    counts.append(len(names))
+    at = affine.copy()
+    at[:3, 3] += shift * numpy.diag(affine)[:3]
+    for name in names:
+        array = data.GetArray(name)
+        parts = array.GetNumberOfComponents()
+        assert parts == cells.get(name, 1 if pores else 3), (name, parts)
+        from_vtk = vtk_to_numpy(array).reshape(*size, parts).transpose(2, 1, 0, 3)
+        nifti = nibabel.load(out / f"field-{name.replace('_', '-')}.nii.gz")
+        assert numpy.allclose(nifti.affine, at, atol=1e-6), nifti.affine
+        values = nifti.get_fdata(dtype=numpy.float32).reshape(*from_vtk.shape)
+        assert numpy.array_equal(values, from_vtk), name
+        assert not pores or not from_vtk[bone == 0].any(), name
+        if parts > 1:
+            assert nifti.header.get_intent()[0] == "vector", nifti.header.get_intent()
+            assert array.GetComponentName(0) in ("xx", "x", "1"), name
+assert counts == [17, 1], counts
+load = lambda name: nibabel.load(out / f"field-{name}.nii.gz").get_fdata().squeeze()
+sed, strain, stress = load("sed-mpa"), load("strain"), load("stress-mpa")
+assert numpy.allclose(0.5 * (strain * stress).sum(-1), sed, rtol=1e-4, atol=1e-7), "sed is half of stress times strain"
+tensor = numpy.zeros((*sed.shape, 3, 3))
+for i, (p, q) in enumerate([(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]):
+    tensor[..., p, q] = tensor[..., q, p] = stress[..., i]
+assert numpy.allclose(numpy.linalg.eigvalsh(tensor)[..., ::-1], load("principal-stress-mpa"), atol=1e-4), "principal stresses"
+first = load("principal-stress-direction-1")
+along = numpy.einsum("...i,...ij,...j", first, tensor, first)
+assert numpy.allclose(along, load("principal-stress-mpa")[..., 0], atol=1e-4), "directions"
+assert "centre" in nibabel.load(out / "field-sed-mpa.nii.gz").header["descrip"].item().decode()
+print(f"{sum(counts)} fields: VTK and nibabel read the same values at the same place")
 
 # A specimen that was turned, rotated or resampled still lies over its scan, in both files.
 for flags in (["--turn", "x"], ["--align", "0.3,0.2,1"], ["--resample", "0.025"]):

@@ -1,5 +1,6 @@
 //! Owns `report` on disk: rows of any number of solved scans in; tables, plots and pages out.
 
+mod details;
 mod facts;
 mod stiffness;
 
@@ -12,6 +13,7 @@ use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
 use crate::record::collect_rows::CollectedRows;
+use crate::record::details::{FAILURE, REACTIONS, SECTIONS, TISSUE};
 use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::specimen;
@@ -235,6 +237,7 @@ fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
         facts: facts::facts(&record),
         stiffness: crate::record::stiffness::record(&dir.join(RECORD))
             .map(|record| self::stiffness::shown(&record)),
+        tables: details::tables(&dir),
         files: files(&dir),
     }
 }
@@ -255,13 +258,22 @@ fn stiffness_table(pages: &[ScanPage], dirs: &[PathBuf]) -> Option<(String, Vec<
     })
 }
 
-/// Fields, curves and models that were asked for.
+/// Tidy tables of results.
+const TABLES: [&str; 6] = [
+    "curve.csv",
+    "fracture.csv",
+    REACTIONS,
+    FAILURE,
+    SECTIONS,
+    TISSUE,
+];
+
+/// Fields, curves, tables and models that were asked for.
 fn files(dir: &Path) -> Vec<String> {
     let wanted = |name: &str| {
         name.starts_with("field") && !name.ends_with(".png")
             || name.ends_with(".inp")
-            || name == "curve.csv"
-            || name == "fracture.csv"
+            || TABLES.contains(&name)
     };
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let names = entries.filter_map(|entry| entry.file_name().into_string().ok());

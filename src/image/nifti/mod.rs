@@ -59,7 +59,7 @@ mod place;
 mod write;
 
 pub use header::decimal;
-pub use write::{Voxel, write, write_grey};
+pub use write::{Voxel, write, write_field, write_grey};
 
 use crate::error::{Error, Result};
 use crate::format::raw::{self, Layout, Scalar};

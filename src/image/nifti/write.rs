@@ -42,6 +42,17 @@ impl Voxel for u16 {
 /// # Errors
 /// More voxels a side than the format holds; a folder that cannot be written to, a full disk.
 pub fn write<T: Voxel>(path: &Path, volume: &Volume<T>) -> Result<()> {
+    refuse_long(path, volume)?;
+    let header = header_of(volume);
+    let voxels: &[u8] = bytemuck::cast_slice(volume.as_slice());
+    let gz = path.extension().is_some_and(|e| e == "gz");
+    atomic::write_with(path, |out| match gz {
+        true => gzip::write(out, &[&header, voxels]),
+        false => out.write_all(&header).and_then(|()| out.write_all(voxels)),
+    })
+}
+
+fn refuse_long<T>(path: &Path, volume: &Volume<T>) -> Result<()> {
     let n = volume.grid.n;
     if n.iter().any(|&n| n > 32_767) {
         return Err(Error::file(
@@ -53,13 +64,31 @@ pub fn write<T: Voxel>(path: &Path, volume: &Volume<T>) -> Result<()> {
             "crop the scan first",
         ));
     }
-    let header = header_of(volume);
-    let voxels: &[u8] = bytemuck::cast_slice(volume.as_slice());
-    let gz = path.extension().is_some_and(|e| e == "gz");
-    atomic::write_with(path, |out| match gz {
-        true => gzip::write(out, &[&header, voxels]),
-        false => out.write_all(&header).and_then(|()| out.write_all(voxels)),
-    })
+    Ok(())
+}
+
+/// A field with its `about` in the header (79 bytes of it): one component as a volume, several as a vector image (five
+/// dimensions, intent 1007), component by component.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_field(path: &Path, components: &[Volume<f32>], about: &str) -> Result<()> {
+    let Some(first) = components.first() else {
+        return Ok(());
+    };
+    refuse_long(path, first)?;
+    let mut header = header_of(first);
+    let about: String = about.chars().filter(char::is_ascii).take(79).collect();
+    header[148..148 + about.len()].copy_from_slice(about.as_bytes());
+    if components.len() > 1 {
+        let mut put = |at: usize, v: i16| header[at..at + 2].copy_from_slice(&v.to_ne_bytes());
+        put(40, 5);
+        put(50, components.len() as i16);
+        put(68, 1007);
+    }
+    let mut parts: Vec<&[u8]> = vec![&header];
+    parts.extend(components.iter().map(|c| bytemuck::cast_slice(c.as_slice())));
+    atomic::write_with(path, |out| gzip::write(out, &parts))
 }
 
 /// Grey values: where all are whole numbers of 16 bits, as those, which takes half the space and time.

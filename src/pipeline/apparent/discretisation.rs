@@ -4,13 +4,15 @@ use crate::error::Result;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
-use crate::pipeline::apparent::fields::Recorded;
+use crate::measure::apparent::EndWork;
+use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
+use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::reactions::End;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::result::settings::Settings;
 use crate::solver::amg::AmgParams;
-use crate::solver::cg::CgInfo;
 use crate::volume::Specimen;
 
 /// Displacements of all sites, in mm.
@@ -54,10 +56,13 @@ pub trait Discretisation: Sized {
         loads: LoadSet,
     ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>>;
 
-    /// Apparent moduli of the displacements `u` in equilibrium under [`LoadSet::Compression`].
-    fn assess(&self, u: &[[f64; 3]], info: &CgInfo) -> Moduli;
+    /// The sites at both ends and how they move.
+    fn ends(&self) -> EndSites<'_>;
 
-    /// Fields and failure load of the same displacements, as far as the settings ask for them.
+    /// Apparent moduli of a solution under [`LoadSet::Ends`], where the ends come nearer or part.
+    fn assess(&self, solved: &Equilibrated) -> Moduli;
+
+    /// Fields and other numbers of the same solution, as far as the settings ask for them.
     ///
     /// # Errors
     /// Settings that do not fit the specimen.
@@ -65,16 +70,27 @@ pub trait Discretisation: Sized {
         &self,
         prepared: Prepared,
         params: &SolveParams,
-        u: &[[f64; 3]],
-        moduli: &Moduli,
+        solved: &Equilibrated,
+        work: &EndWork,
     ) -> Result<Recorded>;
+}
+
+/// Calls what it is given with each site of the ends, and its place in mm.
+pub type EachEndSite<'a> = Box<dyn Fn(&mut dyn FnMut(usize, End, [f64; 3])) + 'a>;
+
+/// The ends of a discretised specimen.
+pub struct EndSites<'a> {
+    pub motion: EndMotion,
+    /// Heights of the innermost gripped planes.
+    pub planes_mm: [f64; 2],
+    pub each: EachEndSite<'a>,
 }
 
 /// Loads that share their supports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LoadSet {
-    /// The one displacement of the grips that the settings describe, load number 0.
-    Compression,
+    /// The one motion of the ends that the settings describe, load number 0.
+    Ends,
     /// Unit strains that share their supports (Voigt order, 0 to 5), under the settings' conditions.
     UnitStrains(&'static [usize]),
 }
@@ -83,7 +99,7 @@ impl LoadSet {
     /// Numbers of the loads.
     pub fn numbers(self) -> &'static [usize] {
         match self {
-            LoadSet::Compression => &[0],
+            LoadSet::Ends => &[0],
             LoadSet::UnitStrains(numbers) => numbers,
         }
     }

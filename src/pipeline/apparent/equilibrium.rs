@@ -39,10 +39,10 @@ pub fn equilibrium<'a, O: MixedPrecision, C: Coarsen, G: Functional<3>>(
 /// Poisson's ratio above which tissue is nearly incompressible.
 const NEARLY_INCOMPRESSIBLE: f64 = 0.49;
 
-/// When conjugate gradients may stop. Under mixed conditions stresses are wanted, which are off to first order where the
+/// When conjugate gradients may stop. Under conditions that are not kinematic stresses are wanted, which are off to first order where the
 /// energy is off to second.
 fn accuracy(params: &SolveParams) -> CgParams {
-    let stresses = params.load == Load::Stiffness && params.conditions == Conditions::Mixed;
+    let stresses = params.load == Load::Stiffness && params.conditions != Conditions::Kinematic;
     // Motions that keep the volume are found late: a loose tolerance stopped at 2.6 times its error.
     let tolerance = match params.poisson > NEARLY_INCOMPRESSIBLE {
         true => params.tolerance.min(1e-3),

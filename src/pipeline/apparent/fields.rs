@@ -2,10 +2,19 @@
 //! lattice values at its sites.
 
 use crate::discretisation::lattice::placement::Frame;
-use crate::measure::pistoia::Failure;
 use crate::measure::surface_energy::SurfaceEnergy;
+use crate::result::details::{Details, FailureAt};
 use crate::volume::Volume;
+use crate::solver::cg::CgInfo;
 use serde::{Deserialize, Serialize};
+
+/// Displacements (mm) in equilibrium and the nodal forces (N) that they take.
+#[derive(Clone, Copy)]
+pub struct Equilibrated<'a> {
+    pub u: &'a [[f64; 3]],
+    pub force: &'a [[f64; 3]],
+    pub info: &'a CgInfo,
+}
 
 /// A field of a solved model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,26 +26,76 @@ pub enum Field {
     VonMises,
     /// Bone fraction of the elements.
     Fraction,
+    /// Six components, engineering shears.
+    Strain,
+    Stress,
+    /// Three values, largest first, and their directions.
+    PrincipalStrain,
+    PrincipalStress,
+    /// `√(2 SED / E)` (Pistoia et al. 2002).
+    EffectiveStrain,
+    /// What the supports put on the nodes.
+    NodalForce,
 }
 
-/// One field by voxel of the scan, 0 where no element is.
+impl Field {
+    /// The words of settings, in the order of the variants.
+    pub const WORDS: &[&str] = &[
+        "displacement",
+        "sed",
+        "von-mises",
+        "fraction",
+        "strain",
+        "stress",
+        "principal-strain",
+        "principal-stress",
+        "effective-strain",
+        "nodal-force",
+    ];
+
+    /// Those that lattices have.
+    pub const OF_LATTICES: &[Field] = &[
+        Field::Displacement,
+        Field::Sed,
+        Field::Fraction,
+        Field::NodalForce,
+    ];
+}
+
+/// One field on the scan's grid, 0 where no element is.
 #[derive(Debug, Clone)]
 pub struct FieldVolume {
     /// With the unit, as `sed_mpa`.
-    pub name: &'static str,
-    pub values: Volume<f32>,
+    pub name: String,
+    /// One volume a component; of nodes one longer than the scan along each axis.
+    pub components: Vec<Volume<f32>>,
+    /// What the components are, as `xx`; empty for a scalar.
+    pub labels: &'static [&'static str],
+    pub place: Place,
+    /// In words, at most 79 characters: NIfTI headers hold no more.
+    pub about: String,
 }
 
-/// Fields and failure load, as far as the settings ask for them.
+/// Where the values of a field lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    Voxels,
+    /// Corners of the voxels.
+    Nodes,
+}
+
+/// What was recorded of a solve, as far as the settings ask for it.
 #[derive(Debug, Clone, Default)]
 pub struct Recorded {
     /// On the scan's grid.
     pub fields: Vec<FieldVolume>,
-    pub failure: Option<Failure>,
+    /// Failure by the criterion of the settings.
+    pub failure: Option<FailureAt>,
     /// How the modulus answers to the surface; of voxel elements of one tissue.
     pub surface: Option<SurfaceEnergy>,
     /// At the sites of a lattice.
     pub sites: Option<SiteFields>,
+    pub details: Details,
 }
 
 /// Fields of a lattice, by site.
@@ -49,6 +108,8 @@ pub struct SiteFields {
     pub sed_mpa: Option<Vec<f64>>,
     /// A site's share of a whole site's stiffness.
     pub fraction: Option<Vec<f64>>,
+    /// What the supports put on a site.
+    pub force_n: Option<Vec<[f64; 3]>>,
 }
 
 impl SiteFields {
@@ -57,7 +118,7 @@ impl SiteFields {
     pub fn of(
         fields: &[Field],
         (frame, indices): (&Frame, &[[i32; 3]]),
-        u: &[[f64; 3]],
+        solved: &Equilibrated,
         energy_nmm: impl Fn(usize) -> f64,
         fraction: impl Fn(usize) -> f64,
     ) -> Option<SiteFields> {
@@ -69,9 +130,10 @@ impl SiteFields {
         let sites = || 0..indices.len();
         Some(SiteFields {
             at_mm: indices.iter().map(|at| frame.position_mm(*at)).collect(),
-            displacement_mm: asked(Field::Displacement).then(|| u.to_vec()),
+            displacement_mm: asked(Field::Displacement).then(|| solved.u.to_vec()),
             sed_mpa: asked(Field::Sed).then(|| sites().map(|s| energy_nmm(s) / cell_mm3).collect()),
             fraction: asked(Field::Fraction).then(|| sites().map(&fraction).collect()),
+            force_n: asked(Field::NodalForce).then(|| solved.force.to_vec()),
         })
     }
 }

@@ -3,18 +3,19 @@
 use crate::discretisation::voxels::{self, Planes};
 use crate::error::{Error, Result};
 use crate::operator::coarsen::Coarsen;
-use crate::operator::{Functional, MixedPrecision};
+use crate::operator::{Functional, MixedPrecision, Operator};
 use crate::pipeline::apparent::discretisation::{
-    Cost, Discretisation, Known, LoadSet, Prepared, System,
+    Cost, Discretisation, EndSites, Known, LoadSet, Prepared, System,
 };
 use crate::pipeline::apparent::equilibrium::{Observe, equilibrium};
-use crate::pipeline::apparent::fields::Recorded;
+use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::mechanisms::mechanisms;
 use crate::pipeline::apparent::params::{Load, SolveParams};
-use crate::pipeline::apparent::solved::Solved;
+use crate::pipeline::apparent::reactions::reactions;
+use crate::pipeline::apparent::solved::{Moduli, Solved};
 use crate::pipeline::apparent::stiffness::{Stiffness, stiffness};
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::result::settings::Settings;
+use crate::result::settings::{Motion, Settings};
 use crate::volume::Specimen;
 use std::ops::Deref;
 
@@ -122,19 +123,36 @@ impl<D: Discretisation> Solve for Of<D> {
             return Ok(JobResult::Stiffness(solved));
         }
         let model = D::build(&self.0, prepared, params)?;
-        let system = model.system(LoadSet::Compression);
+        let system = model.system(LoadSet::Ends);
         if system.sites == 0 {
             let no_answer = bone_connects(prepared.specimen, params);
             let solved = Solved::disconnected(system.dropped, no_answer);
             return Ok(JobResult::Modulus(solved, Recorded::default()));
         }
         let mechanisms = count_mechanisms(&system)?;
-        let loads = LoadSet::Compression.numbers();
+        let loads = LoadSet::Ends.numbers();
         let (_, u, info) = equilibrium(&system, loads, params, observe)
             .next()
-            .expect("a compression is one load");
-        let moduli = model.assess(&u, &info);
-        let recorded = model.fields(prepared, params, &u, &moduli)?;
+            .expect("one motion of the ends is one load");
+        let mut force = vec![[0.0; 3]; u.len()];
+        system.operator.apply(&u, &mut force);
+        let solved = Equilibrated {
+            u: &u,
+            force: &force,
+            info: &info,
+        };
+        let EndSites {
+            motion,
+            planes_mm,
+            each,
+        } = model.ends();
+        let moduli = match motion.motion {
+            Motion::Along => model.assess(&solved),
+            _ => Moduli::NONE,
+        };
+        let work = motion.work(&moduli, &info);
+        let mut recorded = model.fields(prepared, params, &solved, &work)?;
+        recorded.details.ends = reactions(&motion, planes_mm, &force, each).to_vec();
         let solved = Solved {
             sites: system.sites,
             dropped: system.dropped,
@@ -143,6 +161,7 @@ impl<D: Discretisation> Solve for Of<D> {
             residual: info.residual,
             ended: info.ended,
             moduli,
+            work,
             mechanisms,
             no_answer: moduli.e_app_mpa == 0.0,
         };

@@ -3,13 +3,16 @@
 //! A discretisation of the specimen stands behind one trait, [`Discretisation`]; which one a solve takes is chosen here and
 //! nowhere else. A new one is a file with that trait, and an arm below.
 
+pub mod checks;
 pub mod discretisation;
 pub mod equilibrium;
 pub mod fields;
 pub mod job;
 pub mod lattice;
 pub mod mechanisms;
+pub mod motion;
 pub mod params;
+pub mod reactions;
 pub mod resolution;
 pub mod solved;
 pub mod stiffness;
@@ -26,7 +29,7 @@ use crate::pipeline::lattice::{Boundary, Case, LatticeParams};
 use crate::solver::cg::CgStep;
 use crate::volume::Specimen;
 pub use discretisation::Discretisation;
-pub use params::{CoarsenBy, Conditions, Ends, Load, Method, SolveParams};
+pub use params::{CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams};
 
 /// The solves that the settings name, in the order of their rows.
 pub fn jobs(lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {

@@ -1,12 +1,11 @@
 //! Owns the settings of a solve: material, load, supports, accuracy, and what is wanted besides the modulus.
 
-use crate::error::{Error, Result};
 use crate::grid::Axis;
 use crate::io::percent;
 use crate::measure::pistoia::Pistoia;
 use crate::physics::material::Material;
 use crate::pipeline::apparent::fields::Field;
-pub use crate::result::settings::{Conditions, Ends, Load, Method};
+pub use crate::result::settings::{Conditions, Ends, Load, Method, Sed};
 use serde::{Deserialize, Serialize};
 
 /// What becomes of a block of voxels that one element covers.
@@ -35,6 +34,9 @@ pub struct SolveParams {
     /// Thickness of each grip; 0: the end planes.
     pub grip_mm: f64,
     pub load: Load,
+    /// Bending and torsion: by how many degrees the ends turn against each other.
+    pub angle_deg: f64,
+    /// Uniaxial loads; other loads hold the ends in all components.
     pub ends: Ends,
     /// load = "stiffness": what the unit strains do on the faces.
     pub conditions: Conditions,
@@ -58,6 +60,12 @@ pub struct SolveParams {
     pub fields: Vec<Field>,
     /// voxel-fe: find the failure load by this criterion.
     pub pistoia: Option<Pistoia>,
+    /// Labels whose bone counts in that criterion; all bone where there are none.
+    pub failure_labels: Vec<i32>,
+    /// voxel-fe: the strain energy density of elements.
+    pub sed: Sed,
+    /// voxel-fe: how strains and stresses are distributed over each tissue, and what each carries.
+    pub statistics: bool,
 }
 
 impl Default for SolveParams {
@@ -70,6 +78,7 @@ impl Default for SolveParams {
             strain: -0.01,
             grip_mm: 0.0,
             load: Load::Uniaxial,
+            angle_deg: 1.0,
             ends: Ends::Free,
             conditions: Conditions::Kinematic,
             axis: Axis::Z,
@@ -83,6 +92,9 @@ impl Default for SolveParams {
             mechanisms: false,
             fields: Vec::new(),
             pistoia: None,
+            failure_labels: Vec::new(),
+            sed: Sed::default(),
+            statistics: false,
         }
     }
 }
@@ -94,102 +106,11 @@ impl SolveParams {
             || self.smoothed_again
             || (self.refine > 1 && !self.refine_mask)
             || (self.coarsen > 1 && self.coarsen_by == CoarsenBy::Threshold)
+            || self.needs_labels()
     }
 
-    /// Refuses what is no elastic material, no load or no accuracy.
-    pub fn check(&self) -> Result<()> {
-        let rules = [
-            (
-                "solve.young_mpa",
-                self.young_mpa,
-                self.young_mpa > 0.0,
-                "a modulus in MPa above 0 (the paper: 1000)",
-            ),
-            (
-                "solve.poisson",
-                self.poisson,
-                self.poisson > -1.0 && self.poisson < 0.5,
-                "a ratio above -1 and below 0.5 (bone: 0.3; at 0.5 the material is incompressible and has no stiffness matrix)",
-            ),
-            (
-                "solve.strain",
-                self.strain,
-                self.strain != 0.0,
-                "a strain other than 0; negative is compression (the paper: -0.0042)",
-            ),
-            (
-                "solve.grip_mm",
-                self.grip_mm,
-                self.grip_mm >= 0.0,
-                "a thickness in mm; 0 grips the end planes (the paper: 0.6)",
-            ),
-            (
-                "solve.tolerance",
-                self.tolerance,
-                self.tolerance > 0.0 && self.tolerance < 1.0,
-                "a relative error between 0 and 1 (0.001 is 0.1 %)",
-            ),
-        ];
-        for (key, value, ok, expected) in rules {
-            if !ok || !value.is_finite() {
-                return Err(Error::setting(
-                    key,
-                    format!("not usable: {value}"),
-                    format!("give {expected}"),
-                ));
-            }
-        }
-        for (key, factor) in [
-            ("solve.refine", self.refine),
-            ("solve.coarsen", self.coarsen),
-        ] {
-            if factor == 0 {
-                return Err(Error::setting(
-                    key,
-                    "found 0",
-                    "give 1 or more; 1 is one element per voxel",
-                ));
-            }
-        }
-        if self.refine > 1 && self.coarsen > 1 {
-            return Err(Error::setting(
-                "solve.refine",
-                format!(
-                    "refine {} and coarsen {} exclude each other",
-                    self.refine, self.coarsen
-                ),
-                "set one of them to 1",
-            ));
-        }
-        if let Some(material) = &self.material {
-            material.check(self.poisson)?;
-        }
-        if let Some(pistoia) = &self.pistoia {
-            pistoia.check()?;
-        }
-        let recorded = !self.fields.is_empty() || self.pistoia.is_some();
-        if recorded && self.load == Load::Stiffness {
-            return Err(Error::setting(
-                "solve.fields",
-                "fields and the failure load come from one load",
-                "add --load uniaxial or confined, or leave --fields and --failure out",
-            ));
-        }
-        let of_elements = self.fields.contains(&Field::VonMises) || self.pistoia.is_some();
-        if of_elements && self.method == Method::Lattice {
-            return Err(Error::setting(
-                "solve.fields",
-                "the failure load and von Mises stresses come from voxel elements",
-                "add --method voxel-fe, or ask for --fields displacement,sed,fraction of a lattice",
-            ));
-        }
-        if self.max_iterations == 0 {
-            return Err(Error::setting(
-                "solve.max_iterations",
-                "0 iterations solve nothing",
-                "give 1 or more",
-            ));
-        }
-        Ok(())
+    /// Whether labels of the scan are read where it has some.
+    pub fn needs_labels(&self) -> bool {
+        self.statistics || !self.failure_labels.is_empty()
     }
 }

@@ -1,9 +1,10 @@
 //! Owns what a solve yields, and its row of the results table.
 
-use crate::pipeline::apparent::params::{Load, Method, SolveParams};
+use crate::measure::apparent::EndWork;
+use crate::pipeline::apparent::params::{Ends, Load, Method, SolveParams};
 use crate::result::notes;
 use crate::result::row::{Marks, Row, Solution};
-use crate::result::settings::{Settings, Supports};
+use crate::result::settings::{Motion, Settings, Supports};
 use crate::solver::cg::Ended;
 use crate::volume::Specimen;
 
@@ -20,6 +21,17 @@ pub struct Moduli {
     pub algebraic_error_mpa: f64,
 }
 
+impl Moduli {
+    /// Not a number: ends that slide, tilt or turn have no apparent modulus.
+    pub const NONE: Moduli = Moduli {
+        e_app_mpa: f64::NAN,
+        from_energy_mpa: f64::NAN,
+        from_reaction_mpa: f64::NAN,
+        from_stress_mpa: f64::NAN,
+        algebraic_error_mpa: f64::NAN,
+    };
+}
+
 /// A solved model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solved {
@@ -29,7 +41,10 @@ pub struct Solved {
     pub iterations: usize,
     pub residual: f64,
     pub ended: Ended,
+    /// [`Moduli::NONE`] under shear, bending and torsion.
     pub moduli: Moduli,
+    /// Of the moved end.
+    pub work: EndWork,
     /// Only where the settings ask for a count.
     pub mechanisms: Option<usize>,
     /// True where the modulus is 0 although the bone connects the loaded faces: the model does not, or counts none of its sites.
@@ -54,6 +69,12 @@ impl Solved {
             residual: 0.0,
             ended: Ended::ResidualTolerance,
             moduli: zero,
+            work: EndWork {
+                force_n: Some(0.0),
+                stiffness_n_per_mm: Some(0.0),
+                moment_nmm: Some(0.0),
+                relative_error: 0.0,
+            },
             mechanisms: None,
             no_answer,
         }
@@ -74,17 +95,24 @@ impl SolveParams {
             young_mpa: self.young_mpa,
             poisson: self.poisson,
             load: self.load,
-            supports: match self.load {
-                Load::Stiffness => Supports::Faces(self.conditions),
-                Load::Uniaxial | Load::Confined => Supports::Ends(self.ends),
+            supports: match self.load.motion() {
+                None => Supports::Faces(self.conditions),
+                Some(Motion::Along) => Supports::Ends(self.ends),
+                Some(_) => Supports::Ends(Ends::Bonded),
             },
             axis: self.axis,
-            strain: self.strain,
+            strain: match self.load.is_by_angle() {
+                true => 0.0,
+                false => self.strain,
+            },
+            angle_deg: self.load.is_by_angle().then_some(self.angle_deg),
             grip_mm: self.grip_mm,
             tv_definition: specimen.tv_definition.clone(),
             tv_mm3: specimen.tv_mm3,
             bv_tv: specimen.bv_tv(),
             tolerance: Some(self.tolerance),
+            sed: (self.method == Method::VoxelFe && self.load != Load::Stiffness)
+                .then_some(self.sed),
             ..Settings::default()
         }
     }
@@ -95,6 +123,10 @@ impl Solved {
     pub fn row(&self, blank: Row) -> Row {
         let m = &self.moduli;
         let count = |n: usize| Some(n as u64);
+        let by_angle = blank.key.load.is_by_angle();
+        // A model that is not connected has a force and a moment of 0 each.
+        let of_force = |v: Option<f64>| v.filter(|v| !by_angle && v.is_finite());
+        let modulus = |v: f64| Some(v).filter(|v| blank.key.load.has_modulus() && !v.is_nan());
         let solution = Solution {
             sites: count(self.sites),
             dropped_sites: count(self.dropped),
@@ -103,17 +135,22 @@ impl Solved {
             residual: Some(self.residual),
             converged: Some(self.ended.converged()),
             // Of no sites the stress is a sum of nothing, which is -0.
-            e_app_mpa: Some(m.e_app_mpa + 0.0),
-            e_app_reaction_mpa: Some(m.from_reaction_mpa),
-            e_app_stress_mpa: Some(m.from_stress_mpa),
-            algebraic_error_mpa: Some(m.algebraic_error_mpa).filter(|e| e.is_finite()),
+            e_app_mpa: modulus(m.e_app_mpa + 0.0),
+            e_app_reaction_mpa: modulus(m.from_reaction_mpa),
+            e_app_stress_mpa: modulus(m.from_stress_mpa),
+            algebraic_error_mpa: modulus(m.algebraic_error_mpa).filter(|e| e.is_finite()),
+            algebraic_error_percent: Some(100.0 * self.work.relative_error)
+                .filter(|e| e.is_finite()),
+            stiffness_n_per_mm: of_force(self.work.stiffness_n_per_mm),
+            force_n: of_force(self.work.force_n),
+            moment_nmm: self.work.moment_nmm.filter(|v| by_angle && v.is_finite()),
             mechanisms: self.mechanisms.map(|n| n as u64),
             ..Solution::default()
         };
         Row {
             solved: Some(solution),
             marks: Marks {
-                note: self.note(blank.key.method),
+                note: self.note(&blank.key),
                 ..blank.marks
             },
             ..blank
@@ -136,18 +173,21 @@ impl Solved {
     }
 
     /// What a reader must know of this row, in words.
-    fn note(&self, method: Method) -> Option<String> {
+    fn note(&self, key: &Settings) -> Option<String> {
+        let zero = match key.load.has_modulus() {
+            true => "E_app is 0",
+            false => "force and moment are 0",
+        };
         match self.ended {
-            _ if self.no_answer => Some(format!("{}: {}", self.lost(method), notes::NO_ANSWER)),
+            _ if self.no_answer => Some(format!("{}: {}", self.lost(key.method), notes::NO_ANSWER)),
             _ if !self.connected() => {
-                Some("no path of bone between the loaded faces: E_app is 0".into())
+                Some(format!("no path of bone between the loaded faces: {zero}"))
             }
             Ended::IterationLimit => Some("not converged: iteration limit reached".into()),
             Ended::Breakdown => Some("not converged: the model is not positive definite".into()),
-            Ended::Mechanism => Some(
-                "what connects the loaded faces only turns and shifts: E_app is 0 to rounding"
-                    .into(),
-            ),
+            Ended::Mechanism => Some(format!(
+                "what connects the loaded faces only turns and shifts: {zero} to rounding"
+            )),
             Ended::EnergyTolerance | Ended::ResidualTolerance => None,
         }
     }

@@ -41,6 +41,7 @@ pub struct Stiffness {
 /// holds, so `C_ij = a(u_i, u_j) / V`, off to second order in the algebraic error). Mixed: periodicity-compatible mixed
 /// uniform conditions of Pahr & Zysset (2008), faces free to slide as an orthotropic cell's would; `C_ij` is the mean
 /// stress `i` under strain `j`, off to first order outside the diagonal, so the energy is known to the tolerance's square.
+/// Symshear: as mixed, with shears put on two pairs of faces; the mean of `C_ij` and `C_ji` is taken.
 ///
 /// # Errors
 /// A volume of interest that is no box, a discretisation without faces, too many nodes.
@@ -113,18 +114,18 @@ impl Stiffness {
 fn groups(conditions: Conditions) -> &'static [&'static [usize]] {
     match conditions {
         Conditions::Kinematic => &[&[0, 1, 2, 3, 4, 5]],
-        Conditions::Mixed => &[&[0, 1, 2], &[3], &[4], &[5]],
+        Conditions::Mixed | Conditions::Symshear => &[&[0, 1, 2], &[3], &[4], &[5]],
     }
 }
 
 /// What is drawn from each solved load before the next.
 struct Products {
     conditions: Conditions,
-    /// `a(u_i, u_j)` (kinematic) or `a(ε_i x, u_j)` (mixed), N mm.
+    /// `a(u_i, u_j)` (kinematic) or `a(ε_i x, u_j)` (mixed, symshear), N mm.
     work: Six,
     /// Squared energy norm of each load's algebraic error.
     error: [f64; 6],
-    /// Squared energy norm of the homogeneous strains (mixed).
+    /// Squared energy norm of the homogeneous strains (mixed, symshear).
     affine: [f64; 6],
     /// Departures of the solved fields from the homogeneous strain (kinematic). Single precision: an error of 1e-7 in a
     /// test field costs 1e-7 of the algebraic error.
@@ -167,7 +168,7 @@ impl Products {
                 let single = u.par_iter().map(|u| u.map(|v| v as f32)).collect();
                 self.departures.push(single);
             }
-            Conditions::Mixed => {
+            Conditions::Mixed | Conditions::Symshear => {
                 let homogeneous = (system.start)(load);
                 system.operator.apply(&homogeneous, &mut force);
                 self.affine[load] = dot(&homogeneous, &force);
@@ -181,7 +182,7 @@ impl Products {
         let norm = |i: usize, j: usize| match self.conditions {
             _ if i == j => self.error[i],
             Conditions::Kinematic => (self.error[i] * self.error[j]).sqrt(),
-            Conditions::Mixed => {
+            Conditions::Mixed | Conditions::Symshear => {
                 let one = (self.affine[i] * self.error[j]).sqrt();
                 0.5 * (one + (self.affine[j] * self.error[i]).sqrt())
             }

@@ -2,7 +2,7 @@
 
 use crate::grid::Axis;
 use crate::result::row::{FailureLoad, Marks, Row, Solution};
-use crate::result::settings::{BoundaryRule, CellType, Elements, Load, Method, Settings, Supports};
+use crate::result::settings::{BoundaryRule, CellType, Elements, Load, Method, Sed, Settings, Supports};
 use serde::{Deserialize, Serialize};
 
 /// A row as files hold it. What the columns mean is at the fields of [`Settings`], [`Solution`] and [`Marks`].
@@ -62,6 +62,24 @@ pub(super) struct Columns {
     error_mpa: Option<f64>,
     #[serde(default)]
     threshold_sensitivity: Option<f64>,
+    #[serde(default)]
+    angle_deg: Option<f64>,
+    #[serde(default)]
+    stiffness_n_per_mm: Option<f64>,
+    #[serde(default)]
+    force_n: Option<f64>,
+    #[serde(default)]
+    moment_nmm: Option<f64>,
+    #[serde(default)]
+    algebraic_error_percent: Option<f64>,
+    #[serde(default)]
+    failure_moment_nmm: Option<f64>,
+    #[serde(default)]
+    failure_displacement_mm: Option<f64>,
+    #[serde(default)]
+    failure_strain: Option<f64>,
+    #[serde(default)]
+    sed: Option<Sed>,
 }
 
 impl From<Row> for Columns {
@@ -107,7 +125,7 @@ impl From<Row> for Columns {
             subject: marks.subject,
             mechanisms: solved.mechanisms,
             material: key.material,
-            failure_load_n: solved.failure.map(|f| f.load_n),
+            failure_load_n: solved.failure.and_then(|f| f.load_n),
             failure_factor: solved.failure.map(|f| f.factor),
             tb_th_mm: marks.tb_th_mm,
             tb_sp_mm: marks.tb_sp_mm,
@@ -117,6 +135,15 @@ impl From<Row> for Columns {
             shape_error_mpa: solved.shape_error_mpa,
             error_mpa,
             threshold_sensitivity: solved.threshold_sensitivity,
+            angle_deg: key.angle_deg,
+            stiffness_n_per_mm: solved.stiffness_n_per_mm,
+            force_n: solved.force_n,
+            moment_nmm: solved.moment_nmm,
+            algebraic_error_percent: solved.algebraic_error_percent,
+            failure_moment_nmm: solved.failure.and_then(|f| f.moment_nmm),
+            failure_displacement_mm: solved.failure.and_then(|f| f.displacement_mm),
+            failure_strain: solved.failure.and_then(|f| f.strain),
+            sed: key.sed,
         }
     }
 }
@@ -143,12 +170,14 @@ impl TryFrom<Columns> for Row {
             supports: c.ends,
             axis: c.axis,
             strain: c.strain,
+            angle_deg: c.angle_deg,
             grip_mm: c.grip_mm,
             tv_definition: c.tv_definition,
             tv_mm3: c.tv_mm3,
             bv_tv: c.bv_tv,
             tolerance: c.tolerance,
             material: c.material,
+            sed: c.sed,
         };
         let solved = Solution {
             sites: c.sites,
@@ -161,16 +190,23 @@ impl TryFrom<Columns> for Row {
             e_app_reaction_mpa: c.e_app_reaction_mpa,
             e_app_stress_mpa: c.e_app_stress_mpa,
             algebraic_error_mpa: c.algebraic_error_mpa,
+            algebraic_error_percent: c.algebraic_error_percent,
+            force_n: c.force_n,
+            moment_nmm: c.moment_nmm,
+            stiffness_n_per_mm: c.stiffness_n_per_mm,
             discretization_error_mpa: c.discretization_error_mpa,
             shape_error_mpa: c.shape_error_mpa,
             threshold_sensitivity: c.threshold_sensitivity,
             wall_s: c.wall_s,
             peak_mib: c.peak_mib,
             mechanisms: c.mechanisms,
-            failure: c
-                .failure_load_n
-                .zip(c.failure_factor)
-                .map(|(load_n, factor)| FailureLoad { load_n, factor }),
+            failure: c.failure_factor.map(|factor| FailureLoad {
+                factor,
+                load_n: c.failure_load_n,
+                moment_nmm: c.failure_moment_nmm,
+                displacement_mm: c.failure_displacement_mm,
+                strain: c.failure_strain,
+            }),
         };
         Ok(Row {
             key,

@@ -1,40 +1,34 @@
 //! Owns lattices with one site per connected component of bone in a cell as discretisations.
 
 use crate::error::{Error, Result};
-use crate::measure::apparent::Loaded;
+use crate::measure::apparent::EndWork;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::connected::{ConnectedLattice, ConnectedSprings};
 use crate::pipeline::apparent::discretisation::{
-    Cost, Discretisation, Known, LoadSet, Prepared, System,
+    Cost, Discretisation, EndSites, Known, LoadSet, Prepared, System,
 };
-use crate::pipeline::apparent::fields::{Recorded, SiteFields};
+use crate::pipeline::apparent::fields::{Equilibrated, Recorded, SiteFields};
 use crate::pipeline::apparent::lattice::mixed_tissue::Blend;
 use crate::pipeline::apparent::lattice::stress::Stress;
 use crate::pipeline::apparent::lattice::{Placed, cost, label, refuse_unit_strains};
+use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::lattice::{Case, build_connected};
 use crate::result::settings::Settings;
-use crate::solver::cg::CgInfo;
 use crate::volume::Specimen;
 
 /// A lattice of connected components between its grips.
 pub struct ConnectedModel {
     lattice: ConnectedLattice,
-    loaded: Loaded,
+    motion: EndMotion,
     params: SolveParams,
 }
 
 impl ConnectedModel {
     fn placed(&self) -> Placed<'_> {
-        let sites = &self.lattice.sites;
-        Placed {
-            frame: &sites.frame,
-            indices: &sites.indices,
-            grips: sites.grips,
-            dropped: sites.dropped,
-        }
+        placed(&self.lattice)
     }
 
     fn stress(&self) -> Stress<'_, ConnectedLattice> {
@@ -42,6 +36,16 @@ impl ConnectedModel {
             model: &self.lattice,
             counts: None,
         }
+    }
+}
+
+fn placed(lattice: &ConnectedLattice) -> Placed<'_> {
+    let sites = &lattice.sites;
+    Placed {
+        frame: &sites.frame,
+        indices: &sites.indices,
+        grips: sites.grips,
+        dropped: sites.dropped,
     }
 }
 
@@ -77,13 +81,12 @@ impl Discretisation for ConnectedModel {
             ));
         }
         let sites = build_connected(specimen, case, params.axis, params.grip_mm)?;
-        let mut model = ConnectedModel {
-            lattice: ConnectedLattice::new(sites, blend.moduli),
-            loaded: Loaded::default(),
+        let lattice = ConnectedLattice::new(sites, blend.moduli);
+        Ok(ConnectedModel {
+            motion: placed(&lattice).motion(specimen, params),
+            lattice,
             params: params.clone(),
-        };
-        model.loaded = model.placed().loaded(specimen, params);
-        Ok(model)
+        })
     }
 
     fn system(
@@ -94,28 +97,33 @@ impl Discretisation for ConnectedModel {
             &self.lattice,
             ConnectedSprings(&self.lattice),
             None::<Stress<ConnectedLattice>>,
-            (&self.params, self.loaded.displacement_mm),
+            (&self.params, self.motion),
             None,
         )
     }
 
-    fn assess(&self, u: &[[f64; 3]], info: &CgInfo) -> Moduli {
-        self.placed().assess(&self.stress(), &self.loaded, u, info)
+    fn ends(&self) -> EndSites<'_> {
+        self.placed().ends(self.motion)
+    }
+
+    fn assess(&self, solved: &Equilibrated) -> Moduli {
+        self.placed()
+            .assess(&self.stress(), &self.motion.loaded, solved)
     }
 
     fn fields(
         &self,
         _: Prepared,
         params: &SolveParams,
-        u: &[[f64; 3]],
-        _: &Moduli,
+        solved: &Equilibrated,
+        _: &EndWork,
     ) -> Result<Recorded> {
         let sites = &self.lattice.sites;
-        let energy = |s| self.lattice.site_energy(u, s);
+        let energy = |s| self.lattice.site_energy(solved.u, s);
         let fraction = |s: usize| f64::from(sites.fractions[s]);
         let at = (&sites.frame, &sites.indices[..]);
         Ok(Recorded {
-            sites: SiteFields::of(&params.fields, at, u, energy, fraction),
+            sites: SiteFields::of(&params.fields, at, solved, energy, fraction),
             ..Recorded::default()
         })
     }

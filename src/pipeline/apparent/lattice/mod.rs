@@ -12,16 +12,18 @@ use crate::error::{Error, Result};
 use crate::measure::apparent::Loaded;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
-use crate::operator::{Functional, MixedPrecision, Operator};
+use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::Virial;
-use crate::pipeline::apparent::discretisation::{Displacements, Places, System};
+use crate::pipeline::apparent::discretisation::{Displacements, EndSites, Places, System};
+use crate::pipeline::apparent::fields::Equilibrated;
 use crate::pipeline::apparent::lattice::stress::Stress;
-use crate::pipeline::apparent::params::{Ends, Load, SolveParams};
+use crate::pipeline::apparent::motion::EndMotion;
+use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::reactions::End;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::lattice::Case;
-use crate::result::settings::{BoundaryRule, CellType, Method, Settings};
+use crate::result::settings::{BoundaryRule, CellType, Method, Motion, Settings};
 use crate::solver::amg::AmgParams;
-use crate::solver::cg::CgInfo;
 use crate::volume::Specimen;
 
 /// The settings that say which lattice a row is of.
@@ -37,9 +39,9 @@ fn label(key: Settings, case: &Case) -> Settings {
 }
 
 fn refuse_unit_strains(params: &SolveParams) -> Result<()> {
-    match params.load {
-        Load::Uniaxial | Load::Confined => Ok(()),
-        Load::Stiffness => Err(Error::setting(
+    match params.load.motion() {
+        Some(_) => Ok(()),
+        None => Err(Error::setting(
             "load",
             "unit strains need faces, and a lattice ends half a cell inside the volume's sides",
             "add --method voxel-fe, or use --load uniaxial",
@@ -61,17 +63,37 @@ impl<'a> Placed<'a> {
         self.indices[site][self.frame.axis.index()]
     }
 
-    fn loaded(&self, specimen: &Specimen, params: &SolveParams) -> Loaded {
+    fn motion(&self, specimen: &Specimen, params: &SolveParams) -> EndMotion {
         let gauge_mm = f64::from(self.grips.high - self.grips.low) * self.frame.step_mm;
-        Loaded {
-            gauge_mm,
-            area_mm2: specimen.area_mm2(params.axis),
-            displacement_mm: params.strain * gauge_mm,
+        EndMotion::of(specimen, params, gauge_mm)
+    }
+
+    /// The sites of the gripped planes.
+    fn ends(self, motion: EndMotion) -> EndSites<'a> {
+        let axis = self.frame.axis.index();
+        let height = |plane: i32| {
+            let mut at = [0; 3];
+            at[axis] = plane;
+            self.frame.position_mm(at)[axis]
+        };
+        EndSites {
+            motion,
+            planes_mm: [self.grips.low, self.grips.high].map(height),
+            each: Box::new(move |visit| {
+                for (site, at) in self.indices.iter().enumerate() {
+                    let end = match at[axis] {
+                        plane if plane <= self.grips.low => End::Lower,
+                        plane if plane >= self.grips.high => End::Upper,
+                        _ => continue,
+                    };
+                    visit(site, end, self.frame.position_mm(*at));
+                }
+            }),
         }
     }
 
     /// Unknowns that the grips and, where sides are confined, the sides hold.
-    fn held(&self, params: &SolveParams) -> Held {
+    fn held(&self, params: &SolveParams, motion: &EndMotion) -> Held {
         let axis = params.axis.index();
         let mut held = Held::none(self.indices.len());
         for s in 0..self.indices.len() {
@@ -79,7 +101,7 @@ impl<'a> Placed<'a> {
             for c in 0..3 {
                 let on_side = self.frame.on_side(self.indices[s], c);
                 let confined = params.load == Load::Confined && c != axis && on_side;
-                let bonded = gripped && (c == axis || params.ends == Ends::Bonded);
+                let bonded = gripped && (c == axis || motion.held_sideways);
                 if confined || bonded {
                     held.hold(s, c);
                 }
@@ -88,15 +110,12 @@ impl<'a> Placed<'a> {
         held
     }
 
-    /// A start that meets these supports: the field of a homogeneous bar.
-    fn bar(&self, displacement_mm: f64) -> Displacements {
-        let axis = self.frame.axis.index();
+    /// A start that meets these supports: the ends' motion, spread evenly between them.
+    fn start(&self, motion: &EndMotion) -> Displacements {
         let Grips { low, high } = self.grips;
         let of = |s: usize| {
-            let along = f64::from(self.plane(s).clamp(low, high) - low);
-            let mut u = [0.0; 3];
-            u[axis] = displacement_mm * along / f64::from(high - low);
-            u
+            let along = f64::from(self.plane(s).clamp(low, high) - low) / f64::from(high - low);
+            motion.at(self.frame.position_mm(self.indices[s]), along)
         };
         (0..self.indices.len()).map(of).collect()
     }
@@ -106,16 +125,17 @@ impl<'a> Placed<'a> {
         operator: &'a O,
         springs: C,
         goal: Option<Stress<'a, M>>,
-        (params, displacement_mm): (&SolveParams, f64),
+        (params, motion): (&SolveParams, EndMotion),
         places: Option<Places>,
     ) -> System<'a, O, C, Stress<'a, M>> {
         System {
             operator,
             coarsen: springs,
             multigrid: AmgParams::lattice(self.frame.lp_mm),
-            goal,
-            held: self.held(params),
-            start: Box::new(move |_| self.bar(displacement_mm)),
+            // The stress along the axis is that of ends that come nearer or part.
+            goal: goal.filter(|_| motion.motion == Motion::Along),
+            held: self.held(params, &motion),
+            start: Box::new(move |_| self.start(&motion)),
             sites: self.indices.len(),
             dropped: self.dropped,
             places,
@@ -123,16 +143,13 @@ impl<'a> Placed<'a> {
     }
 
     /// The headline is from the energy, or from the stress where that was the goal of the solve.
-    fn assess<M: Operator<3> + Virial>(
+    fn assess<M: Virial>(
         &self,
         stress: &Stress<M>,
         loaded: &Loaded,
-        u: &[[f64; 3]],
-        info: &CgInfo,
+        &Equilibrated { u, force, info }: &Equilibrated,
     ) -> Moduli {
         let (axis, sites) = (self.frame.axis.index(), self.indices.len());
-        let mut force = vec![[0.0; 3]; sites];
-        stress.model.apply(u, &mut force);
         let high = |s: &usize| self.plane(*s) >= self.grips.high;
         let reaction: f64 = (0..sites).filter(high).map(|s| force[s][axis]).sum();
         let from_energy_mpa = loaded.from_energy(info.energy);

@@ -1,23 +1,23 @@
 //! Owns lattices with one site per cell as discretisations: firm, floppy, weighted by bone fraction.
 
 use crate::error::Result;
-use crate::measure::apparent::Loaded;
+use crate::measure::apparent::EndWork;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::Lattice;
 use crate::physics::lattice::multigrid::Springs;
 use crate::pipeline::apparent::discretisation::{
-    Cost, Discretisation, Known, LoadSet, Places, Prepared, System,
+    Cost, Discretisation, EndSites, Known, LoadSet, Places, Prepared, System,
 };
-use crate::pipeline::apparent::fields::{Recorded, SiteFields};
+use crate::pipeline::apparent::fields::{Equilibrated, Recorded, SiteFields};
 use crate::pipeline::apparent::lattice::mixed_tissue::Blend;
 use crate::pipeline::apparent::lattice::stress::Stress;
 use crate::pipeline::apparent::lattice::{Placed, cost, label, refuse_unit_strains};
+use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::lattice::{Boundary, Case, build_of, site_values};
 use crate::result::settings::Settings;
-use crate::solver::cg::CgInfo;
 use crate::volume::Specimen;
 use rayon::prelude::*;
 
@@ -28,19 +28,13 @@ pub struct SiteModel {
     whole: Option<Vec<bool>>,
     /// How many bonds away a displacement is felt.
     bonds: i32,
-    loaded: Loaded,
+    motion: EndMotion,
     params: SolveParams,
 }
 
 impl SiteModel {
     fn placed(&self) -> Placed<'_> {
-        let sites = &self.lattice.sites;
-        Placed {
-            frame: &sites.frame,
-            indices: &sites.indices,
-            grips: sites.grips,
-            dropped: sites.dropped,
-        }
+        placed(&self.lattice)
     }
 
     fn stress(&self) -> Stress<'_, Lattice> {
@@ -48,6 +42,16 @@ impl SiteModel {
             model: &self.lattice,
             counts: self.whole.as_deref(),
         }
+    }
+}
+
+fn placed(lattice: &Lattice) -> Placed<'_> {
+    let sites = &lattice.sites;
+    Placed {
+        frame: &sites.frame,
+        indices: &sites.indices,
+        grips: sites.grips,
+        dropped: sites.dropped,
     }
 }
 
@@ -91,16 +95,15 @@ impl Discretisation for SiteModel {
                 Lattice::with_volumetric(sites, moduli, volumetric)
             }
         };
-        let mut model = SiteModel {
+        let motion = placed(&lattice).motion(specimen, params);
+        Ok(SiteModel {
             lattice,
             whole,
             // Volumetric sums couple the ends of two bonds.
             bonds: if moduli.t == 0.0 { 1 } else { 2 },
-            loaded: Loaded::default(),
+            motion,
             params: params.clone(),
-        };
-        model.loaded = model.placed().loaded(specimen, params);
-        Ok(model)
+        })
     }
 
     fn system(
@@ -119,28 +122,33 @@ impl Discretisation for SiteModel {
             &self.lattice,
             Springs::new(&self.lattice),
             goal,
-            (params, self.loaded.displacement_mm),
+            (params, self.motion),
             places,
         )
     }
 
-    fn assess(&self, u: &[[f64; 3]], info: &CgInfo) -> Moduli {
-        self.placed().assess(&self.stress(), &self.loaded, u, info)
+    fn ends(&self) -> EndSites<'_> {
+        self.placed().ends(self.motion)
+    }
+
+    fn assess(&self, solved: &Equilibrated) -> Moduli {
+        self.placed()
+            .assess(&self.stress(), &self.motion.loaded, solved)
     }
 
     fn fields(
         &self,
         _: Prepared,
         params: &SolveParams,
-        u: &[[f64; 3]],
-        _: &Moduli,
+        solved: &Equilibrated,
+        _: &EndWork,
     ) -> Result<Recorded> {
         let sites = &self.lattice.sites;
-        let energy = |s| self.lattice.site_energy(u, s);
+        let energy = |s| self.lattice.site_energy(solved.u, s);
         let fraction = |s: usize| sites.weights.as_ref().map_or(1.0, |weights| weights[s]);
         let at = (&sites.frame, &sites.indices[..]);
         Ok(Recorded {
-            sites: SiteFields::of(&params.fields, at, u, energy, fraction),
+            sites: SiteFields::of(&params.fields, at, solved, energy, fraction),
             ..Recorded::default()
         })
     }

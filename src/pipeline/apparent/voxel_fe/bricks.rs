@@ -30,9 +30,9 @@ pub enum Keep {
 impl Keep {
     /// Those that a load needs.
     pub fn under(load: Load) -> Keep {
-        match load {
-            Load::Stiffness => Keep::AtFaces,
-            Load::Uniaxial | Load::Confined => Keep::BetweenGrips,
+        match load.motion() {
+            None => Keep::AtFaces,
+            Some(_) => Keep::BetweenGrips,
         }
     }
 }

@@ -2,34 +2,45 @@
 
 pub mod bricks;
 pub mod cost;
+mod failure;
+mod labels;
+mod principal;
 mod record;
+mod sections;
+mod spread;
 pub mod supports;
+mod tissue_spread;
 
 use crate::discretisation::voxels::Planes;
 use crate::error::Result;
 use crate::mask::resample;
-use crate::measure::apparent::Loaded;
+use crate::measure::apparent::EndWork;
 use crate::operator::coarsen::Coarsen;
-use crate::operator::{Functional, MixedPrecision, Operator};
+use crate::operator::{Functional, MixedPrecision};
 use crate::par::sum_chunks;
 use crate::pipeline::apparent::discretisation::{
-    Cost, Discretisation, Known, LoadSet, Places, Prepared, System,
+    Cost, Discretisation, EndSites, Known, LoadSet, Places, Prepared, System,
 };
-use crate::pipeline::apparent::fields::Recorded;
-use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
+use crate::pipeline::apparent::motion::EndMotion;
+use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
+use crate::pipeline::apparent::voxel_fe::labels::Labels;
+use crate::pipeline::apparent::voxel_fe::record::Recorder;
 use crate::result::settings::{CellType, Method, Settings};
 use crate::solver::amg::AmgParams;
-use crate::solver::cg::{CgInfo, NoGoal};
+use crate::solver::cg::NoGoal;
 use crate::volume::Specimen;
 
 /// Voxel elements between grips, or joined to the faces where unit strains are the load.
 pub struct VoxelModel {
     bricks: Bricks,
     grips: Planes,
-    loaded: Loaded,
+    motion: EndMotion,
+    /// Values of a labelled scan, by voxel.
+    labels: Option<Labels>,
     params: SolveParams,
     /// The specimen at its elements' resolution, where that is another mask than the scan's.
     resolved: Option<Specimen>,
@@ -41,9 +52,9 @@ impl VoxelModel {
     /// # Errors
     /// Grips that meet.
     pub fn of(bricks: Bricks, specimen: &Specimen, params: &SolveParams) -> Result<Self> {
-        let grip_mm = match params.load {
-            Load::Stiffness => 0.0,
-            Load::Uniaxial | Load::Confined => params.grip_mm,
+        let grip_mm = match params.load.motion() {
+            None => 0.0,
+            Some(_) => params.grip_mm,
         };
         let grid = bricks.mesh().grid;
         let grips = Planes::within(&grid, params.axis, grip_mm)?;
@@ -51,11 +62,8 @@ impl VoxelModel {
         Ok(VoxelModel {
             bricks,
             grips,
-            loaded: Loaded {
-                gauge_mm,
-                area_mm2: specimen.area_mm2(params.axis),
-                displacement_mm: params.strain * gauge_mm,
-            },
+            motion: EndMotion::of(specimen, params, gauge_mm),
+            labels: Labels::of(specimen, params)?,
             params: params.clone(),
             resolved: None,
         })
@@ -116,36 +124,44 @@ impl Discretisation for VoxelModel {
         &self,
         loads: LoadSet,
     ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>> {
-        let (mesh, grips, params) = (self.bricks.mesh(), self.grips, &self.params);
+        let (mesh, grips, motion) = (self.bricks.mesh(), self.grips, &self.motion);
         System {
             operator: &self.bricks,
             coarsen: &self.bricks,
             multigrid: AmgParams::new(mesh.grid.spacing_mm),
             goal: None::<NoGoal>,
             held: match loads {
-                LoadSet::Compression => supports::held(mesh, grips, params),
+                LoadSet::Ends => supports::held(mesh, grips, motion, self.params.load),
                 LoadSet::UnitStrains(numbers) => {
-                    supports::held_faces(mesh, params.conditions, numbers[0])
+                    supports::held_faces(mesh, self.params.conditions, numbers[0])
                 }
             },
             start: Box::new(move |load| match loads {
-                LoadSet::Compression => supports::bar(mesh, grips, self.loaded.displacement_mm),
+                LoadSet::Ends => supports::start(mesh, grips, motion),
                 LoadSet::UnitStrains(_) => supports::affine(mesh, load),
             }),
             sites: mesh.elements,
             dropped: mesh.dropped,
-            places: params.mechanisms.then(|| Places {
+            places: self.params.mechanisms.then(|| Places {
                 at: supports::grid_places(mesh),
                 reach: 1,
             }),
         }
     }
 
-    fn assess(&self, u: &[[f64; 3]], info: &CgInfo) -> Moduli {
-        let (mesh, grips, loaded) = (self.bricks.mesh(), self.grips, &self.loaded);
-        let axis = grips.axis.index();
-        let mut force = vec![[0.0; 3]; mesh.len()];
-        self.bricks.apply(u, &mut force);
+    fn ends(&self) -> EndSites<'_> {
+        let (mesh, grips) = (self.bricks.mesh(), self.grips);
+        let h = mesh.grid.spacing_mm[grips.axis.index()];
+        EndSites {
+            motion: self.motion,
+            planes_mm: [grips.low, grips.high].map(|plane| plane as f64 * h),
+            each: Box::new(move |visit| supports::each_end_node(mesh, grips, visit)),
+        }
+    }
+
+    fn assess(&self, solved: &Equilibrated) -> Moduli {
+        let (mesh, grips, loaded) = (self.bricks.mesh(), self.grips, &self.motion.loaded);
+        let (axis, force, info) = (grips.axis.index(), solved.force, solved.info);
         // Σ x_i f_i is the volume integral of the stress, exactly, since positions are a displacement field of the
         // elements; clamped to the gauge, it is the integral between the innermost gripped planes.
         let sum = |weight: &(dyn Fn(usize) -> f64 + Sync)| {
@@ -179,18 +195,21 @@ impl Discretisation for VoxelModel {
         &self,
         prepared: Prepared,
         params: &SolveParams,
-        u: &[[f64; 3]],
-        moduli: &Moduli,
+        solved: &Equilibrated,
+        work: &EndWork,
     ) -> Result<Recorded> {
-        let reaction_n = moduli.from_reaction_mpa * self.loaded.area_mm2 * params.strain;
-        let Some(specimen) = &self.resolved else {
-            return record::record(&self.bricks, prepared, params, u, reaction_n);
+        let (params, own) = match &self.resolved {
+            None => (params, prepared),
+            Some(specimen) => (
+                &self.params,
+                Prepared {
+                    specimen,
+                    ..prepared
+                },
+            ),
         };
-        let own = Prepared {
-            specimen,
-            ..prepared
-        };
-        let recorded = record::record(&self.bricks, own, &self.params, u, reaction_n)?;
-        Ok(record::onto(recorded, &prepared.specimen.bone))
+        let recorder = Recorder::new(self, own, params, solved, work);
+        let scan = self.resolved.as_ref().map(|_| &prepared.specimen.bone);
+        Ok(recorder.record(scan))
     }
 }

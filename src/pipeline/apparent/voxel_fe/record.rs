@@ -1,192 +1,295 @@
-//! Owns what of solved voxel elements is kept on request: fields on the scan's grid, and the failure load.
+//! Owns what of solved voxel elements is kept on request: fields on the scan's grid, the failure load, tissue by label.
 
-use crate::error::Result;
+use crate::grid::Grid;
 use crate::mask::resample;
+use crate::measure::apparent::EndWork;
 use crate::measure::surface_energy::{Element, SurfaceEnergy, surface_energy};
 use crate::physics::hex8::element::Integration;
-use crate::physics::hex8::fields::{Brick, Kind, bricks, sample};
+use crate::physics::hex8::fields::{Brick, Deformed, Kind};
 use crate::pipeline::apparent::discretisation::Prepared;
-use crate::pipeline::apparent::fields::{Field, FieldVolume, Recorded};
-use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::fields::{Equilibrated, Field, FieldVolume, Place, Recorded};
+use crate::pipeline::apparent::params::{Sed, SolveParams};
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::apparent::voxel_fe::bricks::Bricks;
+use crate::pipeline::apparent::voxel_fe::principal::principal_fields;
+use crate::pipeline::apparent::voxel_fe::sections::{ALL, sections};
+use crate::pipeline::apparent::voxel_fe::spread::{onto, spread};
+use crate::pipeline::apparent::voxel_fe::tissue_spread::{density, effective_strain};
+use crate::pipeline::apparent::voxel_fe::{VoxelModel, failure, tissue_spread};
+use crate::result::details::{Details, FailureAt};
 use crate::volume::{Specimen, Volume};
 
-/// Fields and failure load of a solved model, as far as the settings ask for them.
-pub fn record(
-    model: &Bricks,
-    prepared: Prepared,
-    params: &SolveParams,
-    u: &[[f64; 3]],
-    reaction_n: f64,
-) -> Result<Recorded> {
-    let Prepared { specimen, tissue } = prepared;
-    let surface = match tissue {
-        Tissue::Uniform(s) => surface(
-            model,
-            &[(s.young_mpa, s.poisson, Integration::of(s.poisson))],
-            u,
-        ),
-        Tissue::Mixed(_) => None,
-    };
-    if params.fields.is_empty() && params.pistoia.is_none() {
-        return Ok(Recorded {
-            surface,
-            ..Recorded::default()
-        });
-    }
-    let kinds: Vec<Kind> = match tissue {
-        Tissue::Uniform(s) => vec![(s.young_mpa, s.poisson, Integration::of(s.poisson))],
-        Tissue::Mixed(m) => {
-            let kind = |&nu: &f64| (m.mean_mpa, nu, Integration::of(nu));
-            m.poissons.iter().map(kind).collect()
-        }
-    };
-    let elements = bricks(model.mesh(), &kinds, |node| model.stiffness_of(node), u);
-    let fractions = (params.coarsen > 1).then(|| resample::coarsen(&specimen.bone, params.coarsen));
-    let fraction = |e: usize| fractions.as_ref().map_or(1.0, |f| f.as_slice()[e]);
-    let failure = params.pistoia.and_then(|criterion| {
-        let strain = |b: &Brick| (b.effective_strain, fraction(b.element));
-        criterion.failure(elements.iter().map(strain).collect(), reaction_n)
-    });
-    let on_scan = |name, value: &dyn Fn(&Brick) -> f32| FieldVolume {
-        name,
-        values: spread(model, specimen, params, &elements, value),
-    };
-    let mut fields = Vec::new();
-    for field in &params.fields {
-        match field {
-            Field::Sed => fields.push(on_scan("sed_mpa", &|b| b.energy_density_mpa)),
-            Field::VonMises => fields.push(on_scan("von_mises_mpa", &|b| b.von_mises_mpa)),
-            Field::Fraction => fields.push(on_scan("fraction", &|b| fraction(b.element))),
-            Field::Displacement => {
-                for (a, name) in [
-                    "displacement_x_mm",
-                    "displacement_y_mm",
-                    "displacement_z_mm",
-                ]
-                .into_iter()
-                .enumerate()
-                {
-                    fields.push(on_scan(name, &|b| b.displacement_mm[a]));
-                }
-            }
-        }
-    }
-    Ok(Recorded {
-        fields,
-        failure,
-        surface,
-        sites: None,
-    })
-}
+/// Components of tensors, in the program's order.
+const TENSOR: &[&str] = &["xx", "yy", "zz", "yz", "xz", "xy"];
+const AXES: &[&str] = &["x", "y", "z"];
 
 /// Elements that means of the surface's energy are taken over, about.
 const SAMPLED: usize = 200_000;
 
-/// How the modulus answers to the surface, from a sample of a solved model's elements.
-fn surface(model: &Bricks, kinds: &[Kind], u: &[[f64; 3]]) -> Option<SurfaceEnergy> {
-    let mesh = model.mesh();
-    let step = mesh.elements.div_ceil(SAMPLED);
-    let sampled = sample(mesh, kinds, |node| model.stiffness_of(node), u, step);
-    let mut filled = vec![false; mesh.grid.len()];
-    mesh.low_corner_elements()
-        .flatten()
-        .for_each(|element| filled[element] = true);
-    let [nx, ny, nz] = mesh.grid.n;
-    let free_faces = |e: usize| {
-        let at = [e % nx, e / nx % ny, e / (nx * ny)];
-        let beside = [(0, 1, nx), (1, nx, ny), (2, nx * ny, nz)];
-        let free = |(axis, stride, n): (usize, usize, usize)| {
-            let low = at[axis] > 0 && !filled[e - stride];
-            let high = at[axis] + 1 < n && !filled[e + stride];
-            usize::from(low) + usize::from(high)
+/// A solved model, to be read as the settings ask.
+pub struct Recorder<'a> {
+    model: &'a VoxelModel,
+    specimen: &'a Specimen,
+    params: &'a SolveParams,
+    solved: &'a Equilibrated<'a>,
+    work: &'a EndWork,
+    kinds: Vec<Kind>,
+    is_uniform: bool,
+    /// Bone fractions of coarser elements.
+    fractions: Option<Volume<f32>>,
+}
+
+impl<'a> Recorder<'a> {
+    pub fn new(
+        model: &'a VoxelModel,
+        Prepared { specimen, tissue }: Prepared<'a>,
+        params: &'a SolveParams,
+        solved: &'a Equilibrated<'a>,
+        work: &'a EndWork,
+    ) -> Self {
+        let kinds = match tissue {
+            Tissue::Uniform(s) => vec![(s.young_mpa, s.poisson, Integration::of(s.poisson))],
+            Tissue::Mixed(m) => {
+                let kind = |&nu: &f64| (m.mean_mpa, nu, Integration::of(nu));
+                m.poissons.iter().map(kind).collect()
+            }
         };
-        beside.into_iter().map(free).sum()
-    };
-    surface_energy(sampled.iter().map(|brick| Element {
-        energy_density_mpa: f64::from(brick.energy_density_mpa),
-        free_faces: free_faces(brick.element),
-    }))
-}
-
-/// The same on the scan's grid, from elements of another size: the mean of a voxel's elements where they are finer, that
-/// of the element around the voxel's centre where they are coarser.
-pub fn onto(recorded: Recorded, scan: &Volume<u8>) -> Recorded {
-    let fields = recorded.fields.into_iter().map(|field| FieldVolume {
-        name: field.name,
-        values: volume_onto(&field.values, scan),
-    });
-    Recorded {
-        fields: fields.collect(),
-        ..recorded
-    }
-}
-
-fn volume_onto(values: &Volume<f32>, scan: &Volume<u8>) -> Volume<f32> {
-    let (from, to) = (values.grid, scan.grid);
-    let mut out = vec![0f32; to.len()];
-    if from.n[0] >= to.n[0] {
-        let [fx, fy, _] = from.n;
-        let factor: [usize; 3] = std::array::from_fn(|a| from.n[a] / to.n[a]);
-        let share = 1.0 / factor.iter().product::<usize>() as f32;
-        for (e, value) in values.as_slice().iter().enumerate() {
-            let at = [
-                e % fx / factor[0],
-                e / fx % fy / factor[1],
-                e / (fx * fy) / factor[2],
-            ];
-            out[to.index(at)] += share * value;
-        }
-    } else {
-        let around = |i: usize, a: usize| ((2 * i + 1) * from.n[a]) / (2 * to.n[a]);
-        let [sx, sy, _] = to.n;
-        for (v, out) in out
-            .iter_mut()
-            .enumerate()
-            .filter(|(v, _)| scan.as_slice()[*v] != 0)
-        {
-            let at = [v % sx, v / sx % sy, v / (sx * sy)];
-            *out = values.as_slice()[from.index([0, 1, 2].map(|a| around(at[a], a)))];
+        let is_asked = !params.fields.is_empty() || params.pistoia.is_some() || params.statistics;
+        Recorder {
+            model,
+            specimen,
+            params,
+            solved,
+            work,
+            kinds,
+            is_uniform: matches!(tissue, Tissue::Uniform(_)),
+            fractions: (is_asked && params.coarsen > 1)
+                .then(|| resample::coarsen(&specimen.bone, params.coarsen)),
         }
     }
-    let mut volume = Volume::from_vec(to, out);
-    volume.affine = scan.affine;
-    volume
-}
 
-/// Elements' values by voxel of the scan: the mean of a voxel's elements, or that of the element around its centre.
-fn spread(
-    model: &Bricks,
-    specimen: &Specimen,
-    params: &SolveParams,
-    elements: &[Brick],
-    value: &dyn Fn(&Brick) -> f32,
-) -> Volume<f32> {
-    let (scan, grid) = (specimen.bone.grid, model.mesh().grid);
-    let mut out = vec![0f32; scan.len()];
-    let [nx, ny, _] = grid.n;
-    if params.coarsen > 1 {
-        let mut coarse = vec![0f32; grid.len()];
-        elements.iter().for_each(|b| coarse[b.element] = value(b));
-        let around = |i: usize, a: usize| ((2 * i + 1) * grid.n[a]) / (2 * scan.n[a]);
-        let [sx, sy, _] = scan.n;
-        for (v, out) in out.iter_mut().enumerate() {
-            if specimen.bone.as_slice()[v] != 0 {
-                let at = [v % sx, v / sx % sy, v / (sx * sy)];
-                *out = coarse[grid.index([0, 1, 2].map(|a| around(at[a], a)))];
+    /// Fields and numbers, as far as the settings ask for them; fields on the grid of `scan` where the elements are of another.
+    pub fn record(&self, scan: Option<&Volume<u8>>) -> Recorded {
+        let table = self.failures();
+        let own = |f: &&FailureAt| {
+            let criterion = self.params.pistoia.map(|p| p.critical_volume);
+            criterion == Some(f.critical_volume)
+        };
+        Recorded {
+            fields: self.fields(scan),
+            failure: table.iter().find(own).cloned(),
+            surface: self.is_uniform.then(|| self.surface()).flatten(),
+            sites: None,
+            details: Details {
+                failure: table,
+                ..self.statistics()
+            },
+        }
+    }
+
+    fn deformed(&self) -> Deformed<'_, impl Fn(usize) -> (f32, u8) + Sync> {
+        let bricks = &self.model.bricks;
+        Deformed {
+            mesh: bricks.mesh(),
+            kinds: &self.kinds,
+            stiffness: move |node| bricks.stiffness_of(node),
+            u: self.solved.u,
+        }
+    }
+
+    fn fraction(&self, element: usize) -> f32 {
+        self.fractions.as_ref().map_or(1.0, |f| f.as_slice()[element])
+    }
+
+    /// Label of an element, which is one voxel or a part of one.
+    fn label(&self, element: usize) -> Option<i32> {
+        let labels = self.model.labels.as_ref()?;
+        let ([nx, ny, _], n) = (self.model.bricks.mesh().grid.n, self.params.refine);
+        let (x, y, z) = (element % nx, element / nx % ny, element / (nx * ny));
+        Some(labels.at(self.specimen.bone.grid.index([x / n, y / n, z / n])))
+    }
+
+    fn failures(&self) -> Vec<FailureAt> {
+        let Some(criterion) = self.params.pistoia else {
+            return Vec::new();
+        };
+        let (params, chosen) = (self.params, &self.params.failure_labels);
+        let counts = |label: Option<i32>| {
+            chosen.is_empty() || label.is_some_and(|label| chosen.contains(&label))
+        };
+        let strains = self.deformed().bricks(|b| {
+            counts(self.label(b.element))
+                .then(|| (effective_strain(b, params.sed), self.fraction(b.element)))
+        });
+        let failures = criterion.failures(strains.into_iter().flatten().collect());
+        let at = |f| failure::at(f, params, &self.model.motion, self.work);
+        failures.iter().map(at).collect()
+    }
+
+    fn statistics(&self) -> Details {
+        if !self.params.statistics {
+            return Details::default();
+        }
+        let deformed = self.deformed();
+        let known = self.model.labels.as_ref().map_or(&[][..], |l| &l.values);
+        let name = |e: usize| self.label(e).map_or(ALL.to_owned(), |label| label.to_string());
+        Details {
+            sections: sections(&deformed, self.model.grips, &self.model.motion, &name),
+            tissue: tissue_spread::spread(
+                &deformed,
+                self.params.sed,
+                known,
+                &|e| self.label(e),
+                &|e| self.fraction(e),
+            ),
+            ..Details::default()
+        }
+    }
+
+    /// How the modulus answers to the surface, from a sample of the elements.
+    fn surface(&self) -> Option<SurfaceEnergy> {
+        let mesh = self.model.bricks.mesh();
+        let step = mesh.elements.div_ceil(SAMPLED);
+        let energies = |b: &Brick| (b.element, b.mean_energy_density_mpa);
+        let sampled = self.deformed().sample(step, energies);
+        let mut filled = vec![false; mesh.grid.len()];
+        mesh.low_corner_elements()
+            .flatten()
+            .for_each(|element| filled[element] = true);
+        let [nx, ny, nz] = mesh.grid.n;
+        let free_faces = |e: usize| {
+            let at = [e % nx, e / nx % ny, e / (nx * ny)];
+            let beside = [(0, 1, nx), (1, nx, ny), (2, nx * ny, nz)];
+            let free = |(axis, stride, n): (usize, usize, usize)| {
+                let low = at[axis] > 0 && !filled[e - stride];
+                let high = at[axis] + 1 < n && !filled[e + stride];
+                usize::from(low) + usize::from(high)
+            };
+            beside.into_iter().map(free).sum()
+        };
+        surface_energy(sampled.into_iter().map(|(element, density)| Element {
+            energy_density_mpa: f64::from(density),
+            free_faces: free_faces(element),
+        }))
+    }
+
+    fn fields(&self, scan: Option<&Volume<u8>>) -> Vec<FieldVolume> {
+        let fields = self.params.fields.iter();
+        fields.flat_map(|field| self.field(*field, scan)).collect()
+    }
+
+    fn field(&self, field: Field, scan: Option<&Volume<u8>>) -> Vec<FieldVolume> {
+        let sed = self.params.sed;
+        let scalar = |name, about: String, value: &(dyn Fn(&Brick) -> f32 + Sync)| {
+            vec![one(name, self.on_voxels(scan, |b| [value(b)]), &[], about)]
+        };
+        let at_centres = |words: &str| format!("{words} at element centres");
+        let order = "xx, yy, zz, yz, xz, xy at element centres";
+        match field {
+            Field::Displacement => {
+                let components = self.on_voxels(scan, |b| b.displacement_mm);
+                let names = components.into_iter().zip(AXES).map(|(component, axis)| {
+                    let about = format!("displacement along {axis} in mm at element centres");
+                    one(&format!("displacement_{axis}_mm"), vec![component], &[], about)
+                });
+                names.collect()
+            }
+            Field::Sed => scalar("sed_mpa", about_sed(sed), &|b| density(b, sed)),
+            Field::VonMises => scalar(
+                "von_mises_mpa",
+                at_centres("von Mises stress, MPa,"),
+                &|b| b.von_mises_mpa,
+            ),
+            Field::EffectiveStrain => scalar(
+                "effective_strain",
+                format!("sqrt(2 SED/E), SED {}", sed.in_words()),
+                &|b| effective_strain(b, sed),
+            ),
+            Field::Fraction => scalar("fraction", "bone fraction of elements".into(), &|b| {
+                self.fraction(b.element)
+            }),
+            Field::Strain => {
+                let about = format!("{order}; shears are engineering shears");
+                vec![one("strain", self.on_voxels(scan, |b| b.strain), TENSOR, about)]
+            }
+            Field::Stress => {
+                let stress = self.on_voxels(scan, |b| b.stress_mpa);
+                vec![one("stress_mpa", stress, TENSOR, format!("MPa, {order}"))]
+            }
+            Field::PrincipalStrain => {
+                let strain = self.on_voxels(scan, |b| b.strain);
+                principal_fields(&strain, 0.5, "principal_strain", "")
+            }
+            Field::PrincipalStress => {
+                let stress = self.on_voxels(scan, |b| b.stress_mpa);
+                principal_fields(&stress, 1.0, "principal_stress", "_mpa")
+            }
+            Field::NodalForce => vec![self.nodal_force()],
+        }
+    }
+
+    /// Values of the elements by voxel of the scan.
+    fn on_voxels<const N: usize>(
+        &self,
+        scan: Option<&Volume<u8>>,
+        read: impl Fn(&Brick) -> [f32; N] + Sync,
+    ) -> Vec<Volume<f32>> {
+        let grid = self.model.bricks.mesh().grid;
+        let values = self.deformed().bricks(|b| (b.element, read(b)));
+        let component = |i: usize| {
+            let own = values.iter().map(|(element, v)| (*element, v[i]));
+            let volume = spread(grid, self.specimen, self.params, own);
+            scan.map_or_else(|| volume.clone(), |scan| onto(&volume, scan))
+        };
+        (0..N).map(component).collect()
+    }
+
+    /// Forces of the supports at the corners of the voxels.
+    fn nodal_force(&self) -> FieldVolume {
+        let (mesh, bone) = (self.model.bricks.mesh(), &self.specimen.bone);
+        let nodes = Grid::new(mesh.grid.n.map(|n| n + 1), mesh.grid.spacing_mm);
+        let mut values = vec![vec![0f32; nodes.len()]; 3];
+        for segment in &mesh.segments {
+            let [x, y, z] = segment.at.map(|v| v as usize);
+            let own = segment.nodes().enumerate();
+            for (i, node) in own.filter(|(_, node)| mesh.around[*node] != 0) {
+                let at = nodes.index([x + i, y, z]);
+                (0..3).for_each(|a| values[a][at] = self.solved.force[node][a] as f32);
             }
         }
-    } else {
-        let n = params.refine;
-        let share = 1.0 / (n * n * n) as f32;
-        for b in elements {
-            let e = b.element;
-            let voxel = scan.index([e % nx / n, e / nx % ny / n, e / (nx * ny) / n]);
-            out[voxel] += share * value(b);
+        let [hx, hy, hz] = mesh.grid.spacing_mm;
+        let straight = [[hx, 0.0, 0.0, 0.0], [0.0, hy, 0.0, 0.0], [0.0, 0.0, hz, 0.0]];
+        let affine = bone.affine.unwrap_or(straight);
+        let affine = affine.map(|[x, y, z, o]| [x, y, z, o - 0.5 * (x + y + z)]);
+        let volume = |values| Volume {
+            affine: Some(affine),
+            ..Volume::from_vec(nodes, values)
+        };
+        FieldVolume {
+            name: "nodal_force_n".to_owned(),
+            components: values.into_iter().map(volume).collect(),
+            labels: AXES,
+            place: Place::Nodes,
+            about: "force of the supports on the nodes (corners of voxels) along x, y, z, N"
+                .to_owned(),
         }
     }
-    let mut volume = Volume::from_vec(scan, out);
-    volume.affine = specimen.bone.affine;
-    volume
+}
+
+fn about_sed(sed: Sed) -> String {
+    format!("strain energy density, MPa, {}", sed.in_words())
+}
+
+fn one(
+    name: &str,
+    components: Vec<Volume<f32>>,
+    labels: &'static [&'static str],
+    about: String,
+) -> FieldVolume {
+    FieldVolume {
+        name: name.to_owned(),
+        components,
+        labels,
+        place: Place::Voxels,
+        about,
+    }
 }

@@ -1,22 +1,24 @@
-//! Owns the supports of voxel elements: grips and sides under compression, all faces under unit strains.
+//! Owns the supports of voxel elements: grips and sides where ends move, all faces under unit strains.
 
 use crate::discretisation::voxels::{Planes, VoxelMesh};
 use crate::measure::stiffness::unit_strain;
 use crate::operator::held::Held;
 use crate::pipeline::apparent::discretisation::Displacements;
-use crate::pipeline::apparent::params::{Conditions, Ends, Load, SolveParams};
+use crate::pipeline::apparent::motion::EndMotion;
+use crate::pipeline::apparent::params::{Conditions, Load};
+use crate::pipeline::apparent::reactions::End;
 
-/// Unknowns that a compression of the grips holds, padding among them.
-pub fn held(mesh: &VoxelMesh, grips: Planes, params: &SolveParams) -> Held {
-    let axis = params.axis.index();
+/// Unknowns that a motion of the ends holds, padding among them.
+pub fn held(mesh: &VoxelMesh, grips: Planes, motion: &EndMotion, load: Load) -> Held {
+    let axis = grips.axis.index();
     let mut held = Held::none(mesh.len());
     each_node(mesh, |node, at| {
         let exists = mesh.around[node] != 0;
         let gripped = at[axis] <= grips.low || at[axis] >= grips.high;
         for (c, &plane) in at.iter().enumerate() {
             let side = plane == 0 || plane == mesh.grid.n[c];
-            let confined = params.load == Load::Confined && c != axis && side;
-            let bonded = gripped && (c == axis || params.ends == Ends::Bonded);
+            let confined = load == Load::Confined && c != axis && side;
+            let bonded = gripped && (c == axis || motion.held_sideways);
             if confined || bonded || !exists {
                 held.hold(node, c);
             }
@@ -25,17 +27,36 @@ pub fn held(mesh: &VoxelMesh, grips: Planes, params: &SolveParams) -> Held {
     held
 }
 
-/// A start that meets these supports: the field of a homogeneous bar whose grips come nearer by `displacement_mm`
-/// (negative) or part.
-pub fn bar(mesh: &VoxelMesh, grips: Planes, displacement_mm: f64) -> Displacements {
-    let axis = grips.axis.index();
+/// A start that meets these supports: the ends' motion, spread evenly between them.
+pub fn start(mesh: &VoxelMesh, grips: Planes, motion: &EndMotion) -> Displacements {
+    let (axis, h) = (grips.axis.index(), mesh.grid.spacing_mm);
     let mut u = vec![[0.0; 3]; mesh.len()];
     each_node(mesh, |node, at| {
         if mesh.around[node] != 0 {
-            u[node][axis] = displacement_mm * along(grips, at[axis]);
+            let place_mm = std::array::from_fn(|a| at[a] as f64 * h[a]);
+            u[node] = motion.at(place_mm, along(grips, at[axis]));
         }
     });
     u
+}
+
+/// Calls `visit` with every node of the gripped planes, which end it is of, and its place in mm.
+pub fn each_end_node(
+    mesh: &VoxelMesh,
+    grips: Planes,
+    visit: &mut dyn FnMut(usize, End, [f64; 3]),
+) {
+    let (axis, h) = (grips.axis.index(), mesh.grid.spacing_mm);
+    each_node(mesh, |node, at| {
+        let end = match at[axis] {
+            plane if plane <= grips.low => End::Lower,
+            plane if plane >= grips.high => End::Upper,
+            _ => return,
+        };
+        if mesh.around[node] != 0 {
+            visit(node, end, std::array::from_fn(|a| at[a] as f64 * h[a]));
+        }
+    });
 }
 
 /// How far a plane lies from the lower grip to the upper: 0 to 1.
@@ -53,6 +74,9 @@ pub fn held_faces(mesh: &VoxelMesh, conditions: Conditions, load: usize) -> Held
             let out = load - 3;
             component == out || face != out && component != face
         }
+        (Conditions::Symshear, 0..3) => component == face,
+        // p's and q's faces carry u_p and u_q, r's u_r.
+        (Conditions::Symshear, _) => (component == load - 3) == (face == load - 3),
     };
     let mut held = Held::none(mesh.len());
     each_node(mesh, |node, at| {

@@ -1,0 +1,177 @@
+//! Owns which settings of a solve are refused, and in which words.
+
+use crate::error::{Error, Result};
+use crate::pipeline::apparent::fields::Field;
+use crate::pipeline::apparent::params::{Load, Method, SolveParams};
+use crate::result::settings::Motion;
+
+impl SolveParams {
+    /// Refuses what is no elastic material, no load or no accuracy.
+    pub fn check(&self) -> Result<()> {
+        let rules = [
+            (
+                "solve.young_mpa",
+                self.young_mpa,
+                self.young_mpa > 0.0,
+                "a modulus in MPa above 0 (the paper: 1000)",
+            ),
+            (
+                "solve.poisson",
+                self.poisson,
+                self.poisson > -1.0 && self.poisson < 0.5,
+                "a ratio above -1 and below 0.5 (bone: 0.3; at 0.5 the material is incompressible and has no stiffness matrix)",
+            ),
+            (
+                "solve.strain",
+                self.strain,
+                self.strain != 0.0,
+                "a strain other than 0; negative is compression (the paper: -0.0042)",
+            ),
+            (
+                "solve.grip_mm",
+                self.grip_mm,
+                self.grip_mm >= 0.0,
+                "a thickness in mm; 0 grips the end planes (the paper: 0.6)",
+            ),
+            (
+                "solve.tolerance",
+                self.tolerance,
+                self.tolerance > 0.0 && self.tolerance < 1.0,
+                "a relative error between 0 and 1 (0.001 is 0.1 %)",
+            ),
+        ];
+        for (key, value, ok, expected) in rules {
+            if !ok || !value.is_finite() {
+                return Err(Error::setting(
+                    key,
+                    format!("not usable: {value}"),
+                    format!("give {expected}"),
+                ));
+            }
+        }
+        check_motion(self)?;
+        for (key, factor) in [
+            ("solve.refine", self.refine),
+            ("solve.coarsen", self.coarsen),
+        ] {
+            if factor == 0 {
+                return Err(Error::setting(
+                    key,
+                    "found 0",
+                    "give 1 or more; 1 is one element per voxel",
+                ));
+            }
+        }
+        if self.refine > 1 && self.coarsen > 1 {
+            return Err(Error::setting(
+                "solve.refine",
+                format!(
+                    "refine {} and coarsen {} exclude each other",
+                    self.refine, self.coarsen
+                ),
+                "set one of them to 1",
+            ));
+        }
+        if let Some(material) = &self.material {
+            material.check(self.poisson)?;
+        }
+        if let Some(pistoia) = &self.pistoia {
+            pistoia.check()?;
+        }
+        check_recorded(self)?;
+        if self.max_iterations == 0 {
+            return Err(Error::setting(
+                "solve.max_iterations",
+                "0 iterations solve nothing",
+                "give 1 or more",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Refuses fields and numbers that the load or the method does not have.
+fn check_recorded(params: &SolveParams) -> Result<()> {
+    let wrong = |found: &str, advice: &str| Err(Error::setting("solve.fields", found, advice));
+    let numbers = params.pistoia.is_some() || params.statistics;
+    if params.load == Load::Stiffness && (numbers || !params.fields.is_empty()) {
+        return wrong(
+            "fields, statistics and the failure load come from one load",
+            "add --load uniaxial, confined or another single load, or leave --fields, --statistics and --failure out",
+        );
+    }
+    let of_elements = params.fields.iter().any(|field| !Field::OF_LATTICES.contains(field));
+    if params.method == Method::Lattice && (numbers || of_elements) {
+        return wrong(
+            "strains, stresses, statistics and the failure load come from voxel elements: a lattice has bonds, and no strain at its sites",
+            "add --method voxel-fe, or ask for --fields displacement,sed,fraction,nodal-force of a lattice",
+        );
+    }
+    if params.fields.contains(&Field::NodalForce) && params.refine.max(params.coarsen) > 1 {
+        return wrong(
+            "nodal forces lie on the nodes of the elements, which are not the corners of the voxels here",
+            "leave --refine and --coarsen out, or the field nodal-force",
+        );
+    }
+    if params.pistoia.is_none() && !params.failure_labels.is_empty() {
+        return Err(Error::setting(
+            "solve.failure_labels",
+            "labels are given for a failure load that is not asked for",
+            "add --failure, or leave the labels out",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses motions that the settings cannot mean.
+///
+/// # Errors
+/// A direction along the load axis, an angle of no turn, grips where ends tilt.
+fn check_motion(params: &SolveParams) -> Result<()> {
+    let wrong = |key: &str, found: String, advice: &str| {
+        Err(Error::setting(format!("solve.{key}"), found, advice))
+    };
+    let (load, axis) = (params.load.name(), params.axis.name());
+    let across = match params.load.motion() {
+        Some(Motion::Sideways(direction)) => Some(direction),
+        Some(Motion::Tilt(about)) => Some(about),
+        _ => None,
+    };
+    if across == Some(params.axis) {
+        return wrong(
+            "load",
+            format!("{load} is along the long axis {axis}"),
+            "name a direction across it, or another --axis",
+        );
+    }
+    if params.load.is_by_angle() && !(params.angle_deg != 0.0 && params.angle_deg.abs() < 90.0) {
+        return wrong(
+            "angle_deg",
+            format!("not usable: {}", params.angle_deg),
+            "give an angle in degrees other than 0 and below 90 (usual: 1)",
+        );
+    }
+    if matches!(params.load.motion(), Some(Motion::Tilt(_))) && params.grip_mm > 0.0 {
+        return wrong(
+            "grip_mm",
+            format!("{load} tilts the end planes, and grips of {} mm would shear", params.grip_mm),
+            "leave --grip-mm out",
+        );
+    }
+    Ok(())
+}
+
+/// Refuses a load without an apparent modulus where one is needed.
+///
+/// # Errors
+/// Shear, bending, torsion.
+pub fn needs_modulus(load: Load, key: &str) -> Result<()> {
+    if load.has_modulus() {
+        return Ok(());
+    }
+    Err(Error::setting(
+        key,
+        format!("--error states the error of E_app, and {} has none", load.name()),
+        "leave --error out (the row states the solver's error), or use --load uniaxial",
+    ))
+}

@@ -1,0 +1,131 @@
+//! Owns the data dictionary of the tidy tables beside `results.csv`.
+
+use crate::record::columns::{
+    ANGLE, AXIS, BOUNDARY, Column, ENDS, FAILURE_DISPLACEMENT, FAILURE_FACTOR, FAILURE_LOAD,
+    FAILURE_MOMENT, FAILURE_STRAIN, File, GRIP, LOAD, LP, METHOD, POISSON, SCAN, SED, STRAIN,
+    STRUCTURE, YOUNG, column,
+};
+
+/// Columns that say which solve a line is of.
+const OF: [Column; 14] = [
+    SCAN, METHOD, STRUCTURE, BOUNDARY, LP, YOUNG, POISSON, LOAD, ENDS, AXIS, STRAIN, ANGLE, GRIP,
+    SED,
+];
+
+/// Those, and `own`. `N` is the number of both.
+const fn with<const N: usize>(own: &[Column]) -> [Column; N] {
+    let mut all = [SCAN; N];
+    let mut i = 0;
+    while i < N {
+        all[i] = if i < OF.len() { OF[i] } else { own[i - OF.len()] };
+        i += 1;
+    }
+    all
+}
+
+pub const REACTIONS: File = File {
+    name: "reactions.csv",
+    about: "forces and moments that the supports put on both ends, one line an end; signed, along the specimen's axes",
+    columns: &with::<24>(&[
+        column("end", "", "lower or upper, along the long axis"),
+        column("force_x_n", "N", "of the supports on the end"),
+        column("force_y_n", "N", "the same along y"),
+        column("force_z_n", "N", "the same along z"),
+        column(
+            "moment_x_nmm",
+            "N mm",
+            "about the middle of the grid at this end's innermost plane",
+        ),
+        column("moment_y_nmm", "N mm", "the same about y"),
+        column("moment_z_nmm", "N mm", "the same about z"),
+        column(
+            "about_x_mm",
+            "mm",
+            "what the moment is about, from the specimen's corner",
+        ),
+        column("about_y_mm", "mm", "the same along y"),
+        column("about_z_mm", "mm", "the same along z"),
+    ]),
+};
+
+const LABEL: Column = column(
+    "label",
+    "",
+    "tissue, by its label in the scan; all for the whole bone",
+);
+const ELEMENTS: Column = column("elements", "", "how many elements");
+
+pub const FAILURE: File = File {
+    name: "failure.csv",
+    about: "failure by Pistoia's criterion at several critical volumes, where --failure asks for it",
+    columns: &with::<24>(&[
+        column(
+            "critical_volume",
+            "",
+            "share of the bone that must exceed the critical strain",
+        ),
+        column("critical_strain", "", "effective strain sqrt(2 SED / E)"),
+        column("labels", "", "labels whose bone counts; all for every voxel"),
+        column(
+            "strain_at_volume",
+            "",
+            "effective strain that the critical volume exceeds under the load applied",
+        ),
+        column("factor", "", FAILURE_FACTOR),
+        FAILURE_LOAD,
+        FAILURE_MOMENT,
+        FAILURE_DISPLACEMENT,
+        FAILURE_STRAIN,
+        column(
+            "failure_angle_deg",
+            "°",
+            "angle of the ends at failure, a magnitude; of bending and torsion",
+        ),
+    ]),
+};
+
+pub const SECTIONS: File = File {
+    name: "sections.csv",
+    about: "what each tissue carries through a layer of elements at both ends and in the middle, where --statistics asks for it",
+    columns: &with::<20>(&[
+        column("section", "", "lower, middle, upper"),
+        LABEL,
+        ELEMENTS,
+        column(
+            "force_n",
+            "N",
+            "along the displacement of the ends, signed; NA under bending and torsion",
+        ),
+        column(
+            "moment_nmm",
+            "N mm",
+            "about the middle of the grid, signed; of bending and torsion",
+        ),
+        column("share", "", "of the section's force or moment"),
+    ]),
+};
+
+pub const TISSUE: File = File {
+    name: "tissue.csv",
+    about: "how strains and stresses are distributed over the elements of each tissue, where --statistics asks for it",
+    columns: &with::<28>(&[
+        LABEL,
+        column(
+            "quantity",
+            "",
+            "sed, effective_strain, von_mises, principal_strain_1 to 3 (largest first)",
+        ),
+        column("unit", "", "of the quantity; empty for strains"),
+        ELEMENTS,
+        column("mean", "", "by volume"),
+        column("sd", "", "standard deviation, of all elements"),
+        column("skewness", "", "third central moment over sd cubed"),
+        column("minimum", "", "least value"),
+        column("p5", "", "5th percentile"),
+        column("p25", "", "25th percentile"),
+        column("median", "", "50th percentile"),
+        column("p75", "", "75th percentile"),
+        column("p95", "", "95th percentile"),
+        column("maximum", "", "largest value"),
+    ]),
+};

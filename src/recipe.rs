@@ -113,6 +113,16 @@ impl Recipe {
 }
 
 fn not_toml(path: &Path, e: &toml::de::Error) -> Error {
+    if path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("csv"))
+    {
+        return Error::file(
+            path,
+            "is a table, where a recipe was expected",
+            "the recipe comes first, then scans or a manifest: bonepd-ct run quick MANIFEST.csv -o OUT",
+        );
+    }
     Error::file(
         path,
         format!("not a valid recipe\n{e}"),
@@ -215,7 +225,10 @@ mod tests {
             assert_eq!(built_in(name).unwrap(), *text);
         }
         for (name, _) in SCENES {
-            assert!(built_in::any(name).is_ok() && built_in(name).is_err(), "{name}");
+            assert!(
+                built_in::any(name).is_ok() && built_in(name).is_err(),
+                "{name}"
+            );
         }
         assert!(
             built_in("papre")
@@ -231,7 +244,10 @@ mod tests {
         let loads: Vec<Load> = recipe.solves().iter().map(|solve| solve.load).collect();
         assert_eq!(loads, [Load::Uniaxial, Load::ShearX]);
         for (text, said) in [
-            ("loads = [\"uniaxial\", \"torsion\"]\n[solve]\nfields = [\"sed\"]", "overwrite"),
+            (
+                "loads = [\"uniaxial\", \"torsion\"]\n[solve]\nfields = [\"sed\"]",
+                "overwrite",
+            ),
             ("loads = [\"shear-z\"]", "along the long axis"),
             ("error = 0.1\nloads = [\"torsion\"]", "torsion has none"),
         ] {

@@ -3,7 +3,7 @@
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 /// Flags that people try, without their dashes, and what is meant here.
-const FLAGS: [(&[&str], &str); 12] = [
+const FLAGS: [(&[&str], &str); 13] = [
     (
         &["threshold", "thresh", "thr", "t", "global-threshold"],
         "--lower V (bone is V or more), with --upper V for a window, or --otsu",
@@ -31,6 +31,10 @@ const FLAGS: [(&[&str], &str); 12] = [
             "tissue-modulus",
         ],
         "--young-mpa E, in MPa (10 GPa is 10000)",
+    ),
+    (
+        &["young-gpa", "e-gpa", "gpa"],
+        "--young-mpa E, in MPa: 10 GPa is 10000",
     ),
     (
         &["nu", "v", "poissons-ratio", "poisson-ratio"],
@@ -102,6 +106,10 @@ fn flag(word: &str) -> Option<String> {
     let bare = word.trim_start_matches('-');
     let bare = bare.split('=').next().unwrap_or(bare).to_lowercase();
     let bare = bare.replace('_', "-");
+    let verb = |name: &str| std::env::args().any(|word| word == name);
+    if ["o", "out", "output"].contains(&bare.as_str()) && verb("man") {
+        return Some("give the folder itself: bonepd-ct man FOLDER".to_owned());
+    }
     if ["o", "out"].contains(&bare.as_str()) {
         return Some("results go into the folder of the segmented scan itself: omit -o".to_owned());
     }

@@ -33,8 +33,20 @@ pub fn run(args: &RecipeArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The name, and the first line of the recipe's own words.
+/// The name, and the first sentence of the recipe's own words.
 fn line(name: &str, text: &str) -> String {
-    let first = text.lines().next().unwrap_or_default();
-    format!("{name:<40} {}\n", first.trim_start_matches(['#', ' ']))
+    let words = text.lines().map_while(|line| line.strip_prefix("# "));
+    let words = words.collect::<Vec<_>>().join(" ");
+    let is_end = |at: usize| {
+        let next = words[at + 2..].chars().next();
+        next.is_none_or(char::is_uppercase)
+    };
+    let end = words
+        .match_indices(". ")
+        .map(|(at, _)| at)
+        .find(|at| is_end(*at));
+    format!(
+        "{name:<40} {}\n",
+        &words[..end.map_or(words.len(), |at| at + 1)]
+    )
 }

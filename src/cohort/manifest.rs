@@ -169,6 +169,9 @@ fn unused_columns(header: &csv::StringRecord) -> std::result::Result<Vec<String>
     }
     match header.iter().any(|name| name == "path") {
         true => Ok(unused),
+        false if header.iter().any(|name| name == "e_app_mpa") => {
+            Err("is a table of results, where a manifest of scans was expected".to_owned())
+        }
         false => Err("has no column `path`".to_owned()),
     }
 }

@@ -147,8 +147,11 @@ impl Run<'_> {
             }
             Err(e) => {
                 own.note(&format!("failed: {e}"));
-                if results::set_aside(&dir) {
-                    own.note("the results of an earlier run are set aside");
+                if results::set_aside(&dir) || results::has_old(&dir) {
+                    own.warn(format!(
+                        "its results of an earlier run are not of this recipe: they are kept as {}",
+                        dir.join(results::OLD_TABLE).display()
+                    ));
                 }
                 if self.jobs.len() > 1 {
                     own.flush();
@@ -217,7 +220,9 @@ impl Run<'_> {
         let known = failures::failures_in(self.out).into_iter();
         failures.extend(known.filter(|failure| left_out(&failure.scan)));
         failures::write_failures(self.out, &failures)?;
-        if !rows.is_empty() {
+        if rows.is_empty() {
+            self.set_earlier_report_aside();
+        } else {
             let recipe = self.write_recipe()?;
             let dirs = [self.out.to_path_buf()];
             let answers = report::answers(&rows, &dirs, self.recipe.error);
@@ -248,6 +253,19 @@ impl Run<'_> {
             .collect();
         self.say_what_fell_short(&results);
         Ok((outcome(&results), results))
+    }
+
+    /// No scan has results: what an earlier run made of its own is not this run's.
+    fn set_earlier_report_aside(&self) {
+        let moved =
+            |from: &str, to: &str| std::fs::rename(self.out.join(from), self.out.join(to)).is_ok();
+        if moved(report::ANSWERS, "answers.old.csv") | moved("report", "report.old") {
+            self.session.warn(format!(
+                "no scan has results: those of an earlier run in {} are kept as answers.old.csv, {} and report.old",
+                self.out.display(),
+                results::OLD_TABLE
+            ));
+        }
     }
 
     fn say_where(&self) {

@@ -8,6 +8,9 @@ use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
 use crate::result::answer::ScanFacts;
+use crate::result::cautions::cautions;
+use crate::result::row::Row;
+use crate::volume::Specimen;
 use std::path::Path;
 
 /// What would run. Every scan is read and segmented, so what its solves need is known.
@@ -18,6 +21,7 @@ pub(super) fn plan(
     out: &Path,
     session: &Session,
 ) -> Vec<ScanResult> {
+    let session = session.with_warnings_once();
     let bar = session.bar(jobs.len() as u64, "scans");
     let mut results = Vec::new();
     for (job, first) in jobs.iter().zip(estimates) {
@@ -26,9 +30,14 @@ pub(super) fn plan(
             quiet: true,
             ..session.clone()
         };
+        let own = Session {
+            scan: Some(job.name.clone()),
+            ..session.clone()
+        };
         let known = segment::in_memory(&job.input, Some(&job.name), &job.segment, &quiet).and_then(
             |specimen| {
                 let estimate = of_specimen(&specimen, first, recipe)?;
+                warn_of_unusual(&specimen, recipe, &own);
                 Ok(Estimate {
                     voxels: estimate.voxels.or(Some(specimen.bone.grid.n)),
                     ..estimate
@@ -53,6 +62,7 @@ pub(super) fn plan(
         }
     }
     bar.finish_and_clear();
+    session.repeated_warnings();
     let estimates: Vec<Estimate> = results.iter().map(|r| r.estimate).collect();
     let seconds = estimates.iter().filter_map(|e| e.time_s).sum::<f64>();
     let time = match seconds {
@@ -69,4 +79,18 @@ pub(super) fn plan(
         jobs.len()
     ));
     results
+}
+
+/// What a run would warn of before its solves.
+fn warn_of_unusual(specimen: &Specimen, recipe: &Recipe, session: &Session) {
+    for solve in recipe.solves() {
+        let row = Row {
+            key: solve.key(specimen),
+            ..Row::default()
+        };
+        let height_mm = specimen.length_mm(solve.axis);
+        for caution in cautions(&row, height_mm) {
+            session.warn(caution);
+        }
+    }
 }

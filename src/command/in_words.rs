@@ -1,5 +1,6 @@
 //! Owns the line that the terminal shows of a row.
 
+use crate::report::cells::with_error;
 use crate::result::answer::AnswerLine;
 use crate::result::cautions::WARNING;
 use crate::result::notes;
@@ -32,7 +33,10 @@ fn answered(row: &Row) -> String {
     let error = solved
         .algebraic_error_percent
         .map_or(String::new(), |p| format!(" (solver ± {p:.3} %)"));
-    match (solved.moment_nmm, solved.force_n.zip(solved.stiffness_n_per_mm)) {
+    match (
+        solved.moment_nmm,
+        solved.force_n.zip(solved.stiffness_n_per_mm),
+    ) {
         (Some(moment), _) => format!("{load} moment {moment:.3} N mm{error}"),
         (None, Some((force, k))) if !row.key.load.has_modulus() => {
             format!("{load} force {force:.3} N, stiffness {k:.3} N/mm{error}")
@@ -92,15 +96,16 @@ pub fn answer_in_words(answer: &AnswerLine) -> String {
     if e_app == 0.0 {
         return format!("carries no load: E_app 0 by {}", answer.method);
     }
-    let error = match (answer.error_mpa, answer.error_percent) {
-        (Some(e), Some(p)) => format!(" ± {e:.3} MPa ({p:.1} %)"),
-        _ => " MPa (error not stated)".to_owned(),
+    let error = match answer.error_percent {
+        Some(p) => format!("MPa ({p:.1} %)"),
+        None => "MPa (error not stated)".to_owned(),
     };
+    let e_app = with_error(answer.e_app_mpa, answer.error_mpa).text;
     let failure = answer
         .failure_load_n
         .map_or(String::new(), |f| format!(", failure load {f:.2} N"));
     format!(
-        "E_app {e_app:.3}{error} by {} {} mm{failure}",
+        "E_app {e_app} {error} by {} {} mm{failure}",
         answer.method,
         (answer.element_mm * 1e6).round() / 1e6
     )

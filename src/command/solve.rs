@@ -328,7 +328,7 @@ impl OpenScan {
         let coarse: Vec<String> = coarse.iter().map(f64::to_string).collect();
         if !coarse.is_empty() {
             session.warn(format!(
-                "lattice parameters {} mm exceed half the mean strut thickness ({:.3} mm): E_app is far from converged there",
+                "lattice parameters {} mm exceed {:.3} mm, half of the mean strut thickness: E_app is far from converged there",
                 coarse.join(", "),
                 0.5 * thickness
             ));

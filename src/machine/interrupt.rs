@@ -7,7 +7,7 @@ const INTERRUPTED: i32 = 130;
 
 #[cfg(unix)]
 const WORDS: &[u8] =
-    b"\nnote: stopped. What is finished is kept: the same command goes on from there (--force starts again)\n";
+    b"\nnote: stopped. What is finished is kept: the same command goes on from there (--force starts again). Of a run, answers.csv and the page come at its end; `bonepd-ct report FOLDER -o OUT` makes them now\n";
 
 /// To be called once, by commands that keep what they have finished.
 #[cfg(unix)]

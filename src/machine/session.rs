@@ -2,7 +2,7 @@
 //! words go: results to stdout, everything else to stderr.
 
 use crate::machine::log::Log;
-use crate::result::notes::{Alike, Alikes};
+use crate::result::notes::Alikes;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
@@ -73,14 +73,15 @@ impl Session {
             return;
         };
         let warned = warned.lock().expect("no one panics while adding a line");
-        for Alike { first, scans } in warned.groups() {
-            if let [of, others @ ..] = &scans[..]
+        for alike in warned.groups() {
+            if let [_, others @ ..] = &alike.scans[..]
                 && !others.is_empty()
             {
                 let names = shortened(others);
                 self.put(&format!(
-                    "warning: the same of {} more scans ({names}): {first} (numbers of {of})",
-                    others.len()
+                    "warning: the same of {} more scans ({names}); of all: {}",
+                    others.len(),
+                    alike.of_all()
                 ));
             }
         }

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::io::table;
 use crate::machine::session::Session;
 use crate::record::failures::{Failure, failures_in};
-use crate::record::results::TABLE;
+use crate::record::results::{OLD_TABLE, TABLE};
 use crate::record::specimen;
 use crate::result::row::Row;
 use std::path::{Path, PathBuf};
@@ -26,10 +26,19 @@ impl CollectedRows {
     pub fn add(&mut self, dir: &Path, session: &Session) -> Result<()> {
         let file = dir.join(TABLE);
         if !file.is_file() {
+            let old = dir.join(OLD_TABLE).is_file();
             return Err(Error::file(
                 dir,
-                "expected a folder with results.csv, found none",
-                "name folders that `solve` or `run` has written to",
+                match old {
+                    true => format!(
+                        "expected {TABLE}, found only {OLD_TABLE}: results of another mask, which a later run has set aside"
+                    ),
+                    false => format!("expected a folder with {TABLE}, found none"),
+                },
+                match old {
+                    true => format!("run again, or rename {OLD_TABLE} to {TABLE}"),
+                    false => "name folders that `solve` or `run` has written to".to_owned(),
+                },
             ));
         }
         let mut rows: Vec<Row> = table::read(&file)?;

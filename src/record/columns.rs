@@ -1,6 +1,7 @@
 //! Owns the data dictionary: what each column of the result files means, and its unit.
 
 mod groups;
+mod methods;
 
 use crate::record::detail_columns;
 use serde::Serialize;
@@ -25,7 +26,7 @@ pub(super) const fn column(name: &'static str, unit: &'static str, about: &'stat
 }
 
 /// All files, in the order in which readers meet them.
-pub const FILES: [File; 11] = [
+pub const FILES: [File; 16] = [
     File {
         name: "answers.csv",
         about: "one row a scan: its apparent modulus with all of its stated error, by the row of the least stated error",
@@ -54,6 +55,31 @@ pub const FILES: [File; 11] = [
         name: "stiffness.csv",
         about: "one row a scan whose stiffness was computed (in the report's folder; the tensor itself is in stiffness.json)",
         columns: &groups::STIFFNESS,
+    },
+    File {
+        name: "e_app.csv",
+        about: "one row a scan, structure and lattice parameter: the moduli by all methods (in the report's folder)",
+        columns: &methods::E_APP,
+    },
+    File {
+        name: "regressions.csv",
+        about: "least squares of methods over scans, y = intercept + slope x (in the report's folder)",
+        columns: &methods::REGRESSIONS,
+    },
+    File {
+        name: "agreement.csv",
+        about: "Bland and Altman's agreement of methods over scans, method less reference (in the report's folder)",
+        columns: &methods::AGREEMENT,
+    },
+    File {
+        name: "distributions.csv",
+        about: "quartiles of the moduli over scans, by method and group (in the report's folder)",
+        columns: &methods::DISTRIBUTIONS,
+    },
+    File {
+        name: "anova.csv",
+        about: "analysis of variance between methods, repeated over scans (in the report's folder)",
+        columns: &methods::ANOVA,
     },
     File {
         name: "failed.csv",
@@ -105,7 +131,11 @@ pub(super) const ENDS: Column = column(
     "",
     "free: loaded ends slide sideways; bonded: they do not; of load stiffness: kinematic, mixed or symshear faces",
 );
-pub(super) const AXIS: Column = column("axis", "", "the long axis: that of compression, from end to end");
+pub(super) const AXIS: Column = column(
+    "axis",
+    "",
+    "the long axis: that of compression, from end to end",
+);
 pub(super) const GRIP: Column = column(
     "grip_mm",
     "mm",
@@ -155,8 +185,11 @@ pub(super) const FAILURE_DISPLACEMENT: Column = column(
     "mm",
     "displacement of the ends at failure, a magnitude",
 );
-pub(super) const FAILURE_STRAIN: Column =
-    column("failure_strain", "", "nominal strain at failure, a magnitude");
+pub(super) const FAILURE_STRAIN: Column = column(
+    "failure_strain",
+    "",
+    "nominal strain at failure, a magnitude",
+);
 pub(super) const SED: Column = column(
     "sed",
     "",
@@ -370,9 +403,12 @@ mod tests {
     use crate::record::failures::Failure;
     use crate::record::stiffness::StiffnessLine;
     use crate::report::groups::{ComparisonLine, GroupLine};
+    use crate::report::statistics::{AgreementLine, BoxLine, RegressionLine};
+    use crate::report::table;
     use crate::result::answer::AnswerLine;
     use crate::result::details::{EndForces, FailureAt, SectionShare, TissueSpread};
     use crate::result::row::Row;
+    use crate::result::statistics::anova::Anova;
     use std::collections::BTreeSet;
 
     /// A column of a file is described, and what is described is a column.
@@ -382,6 +418,11 @@ mod tests {
             ("results.csv", to_csv::<Row>(&[])),
             ("answers.csv", to_csv::<AnswerLine>(&[])),
             ("failed.csv", to_csv::<Failure>(&[])),
+            ("e_app.csv", to_csv::<table::Line>(&[])),
+            ("regressions.csv", to_csv::<RegressionLine>(&[])),
+            ("agreement.csv", to_csv::<AgreementLine>(&[])),
+            ("distributions.csv", to_csv::<BoxLine>(&[])),
+            ("anova.csv", to_csv::<Anova>(&[])),
             ("groups.csv", to_csv::<GroupLine>(&[])),
             ("comparisons.csv", to_csv::<ComparisonLine>(&[])),
             ("stiffness.csv", to_csv::<StiffnessLine>(&[])),

@@ -17,7 +17,11 @@ const fn with<const N: usize>(own: &[Column]) -> [Column; N] {
     let mut all = [SCAN; N];
     let mut i = 0;
     while i < N {
-        all[i] = if i < OF.len() { OF[i] } else { own[i - OF.len()] };
+        all[i] = if i < OF.len() {
+            OF[i]
+        } else {
+            own[i - OF.len()]
+        };
         i += 1;
     }
     all
@@ -65,7 +69,11 @@ pub const FAILURE: File = File {
             "share of the bone that must exceed the critical strain",
         ),
         column("critical_strain", "", "effective strain sqrt(2 SED / E)"),
-        column("labels", "", "labels whose bone counts; all for every voxel"),
+        column(
+            "labels",
+            "",
+            "labels whose bone counts; all for every voxel",
+        ),
         column(
             "strain_at_volume",
             "",

@@ -46,7 +46,11 @@ pub struct StiffnessRecord {
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct StiffnessLine {
     pub scan: String,
+    pub subject: Option<String>,
+    pub group: Option<String>,
     pub conditions: String,
+    /// Edges, `x;y;z` where they differ.
+    pub element_mm: String,
     pub bv_tv: f64,
     pub e1_mpa: Option<f64>,
     pub e2_mpa: Option<f64>,
@@ -59,17 +63,35 @@ pub struct StiffnessLine {
     pub nu12: Option<f64>,
     /// Share of the tensor that no orthotropic tensor holds.
     pub not_orthotropic: Option<f64>,
+    /// Unit vectors of the frame in the axes of the scan, `x;y;z`.
+    pub axis1: Option<String>,
+    pub axis2: Option<String>,
+    pub axis3: Option<String>,
 }
 
 impl StiffnessLine {
-    pub fn of(record: &StiffnessRecord) -> StiffnessLine {
+    /// `subject` and `group` are those of the manifest.
+    pub fn of(
+        record: &StiffnessRecord,
+        subject: Option<String>,
+        group: Option<String>,
+    ) -> StiffnessLine {
+        let rounded = |v: f64| (v * 1e9).round() / 1e9;
+        let triple = |v: [f64; 3]| v.map(|x| rounded(x).to_string()).join(";");
+        let [x, y, z] = record.element_mm.map(rounded);
         let constants = record.orthotropic.as_ref();
         let [e1, e2, e3] = [0, 1, 2].map(|i| constants.map(|o| o.young_mpa[i]));
         let [g23, g13, g12] = [0, 1, 2].map(|i| constants.map(|o| o.shear_mpa[i]));
         let [nu23, nu13, nu12] = [0, 1, 2].map(|i| constants.map(|o| o.poisson[i]));
         StiffnessLine {
             scan: record.scan.clone(),
+            subject,
+            group,
             conditions: record.boundary_conditions.clone(),
+            element_mm: match x == y && y == z {
+                true => x.to_string(),
+                false => triple(record.element_mm),
+            },
             bv_tv: record.bv_tv,
             e1_mpa: e1,
             e2_mpa: e2,
@@ -81,6 +103,9 @@ impl StiffnessLine {
             nu13,
             nu12,
             not_orthotropic: constants.map(|o| o.residual),
+            axis1: constants.map(|o| triple(o.axes[0])),
+            axis2: constants.map(|o| triple(o.axes[1])),
+            axis3: constants.map(|o| triple(o.axes[2])),
         }
     }
 }

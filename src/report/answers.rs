@@ -52,6 +52,7 @@ pub fn answers(rows: &[Row], facts: impl Fn(&str) -> ScanFacts) -> Answers {
         }
     }
     let mut conditions = vec![condition.load_in_words(), condition.tissue_in_words()];
+    conditions.extend(failure_in_words(&lines));
     conditions.extend(methods_in_words(&lines));
     Answers {
         lines,
@@ -59,6 +60,28 @@ pub fn answers(rows: &[Row], facts: impl Fn(&str) -> ScanFacts) -> Answers {
         left_out,
         apart,
     }
+}
+
+impl Answers {
+    /// Says so where a subject has several scans: methods are compared scan by scan.
+    pub(super) fn subjects_repeat(&self) -> Option<&'static str> {
+        let named: Vec<&str> = self
+            .lines
+            .iter()
+            .filter_map(|line| line.subject.as_deref())
+            .collect();
+        (distinct(named.iter().copied()).len() < named.len()).then_some(
+            "Methods are compared scan by scan. Scans of one subject are not independent, so the p values here are too small where subjects have several scans.",
+        )
+    }
+}
+
+/// What a failure load is, where one was found.
+fn failure_in_words(lines: &[AnswerLine]) -> Option<String> {
+    lines.iter().any(|line| line.failure_load_n.is_some()).then(|| {
+        "Failure load: by Pistoia's criterion, the force at which a share of the bone (2 % unless set otherwise) exceeds an effective strain (0.007). It is proportional to the tissue modulus; no error of it is stated."
+            .to_owned()
+    })
 }
 
 /// What each method of the answers is, in plain words.

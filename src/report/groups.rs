@@ -17,7 +17,7 @@ pub struct GroupLine {
     pub scans: usize,
     #[serde(flatten)]
     pub found: Summary,
-    /// Mean of the stated errors of the scans; None where one states none.
+    /// Mean of the subjects' stated errors, each the mean of its scans; None where a scan states none.
     pub mean_error: Option<f64>,
 }
 
@@ -134,14 +134,14 @@ fn of_quantity<'a>(answers: &[&'a AnswerLine], quantity: &Quantity) -> Vec<Group
             .into_iter()
             .filter(|a| (quantity.value)(a).is_some())
             .collect();
-        let errors: Option<Vec<f64>> = own.iter().map(|a| (quantity.error)(a)).collect();
+        let all_state = own.iter().all(|a| (quantity.error)(a).is_some());
+        let errors = members(&own, quantity.error);
         Group {
             name,
             scans: own.len(),
             members: members(&own, quantity.value),
-            mean_error: errors
-                .filter(|e| !e.is_empty())
-                .map(|e| e.iter().sum::<f64>() / e.len() as f64),
+            mean_error: (all_state && !errors.is_empty())
+                .then(|| errors.iter().map(|m| m.value).sum::<f64>() / errors.len() as f64),
         }
     };
     let all = match named.is_empty() {

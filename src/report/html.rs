@@ -92,6 +92,8 @@ pub fn render(report: &Report, pages: &[ScanPage], source: &Source) -> Result<St
         notes => &report.notes,
         answers => plain(&answers::table(&report.answers)),
         groups => plain(&group_tables::lines_table(&report.groups)),
+        grouped => report.groups.lines.iter().any(|line| line.group != "all"),
+        subjects_repeat => report.answers.subjects_repeat(),
         comparisons => plain(&group_tables::comparisons_table(&report.groups)),
         on_errors => group_tables::ON_ERRORS,
         figures => shown_all(figures),

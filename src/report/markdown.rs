@@ -32,6 +32,9 @@ pub fn render(report: &Report, pages: &[ScanPage]) -> String {
         text += &format!("\n{}", list(&report.method_notes));
     }
     text += &statistics_text(&report.statistics);
+    if let Some(words) = report.answers.subjects_repeat() {
+        text += &format!("\n{words}\n");
+    }
     if !report.figures.is_empty() {
         text += "\n## Figures\n";
         report

@@ -134,11 +134,10 @@ fn in_words(group: &Alike, all: usize) -> String {
     match &group.scans[..] {
         [one] => format!("{one}: {}", group.first),
         scans => format!(
-            "{} of {all} scans ({}): {} (numbers of {})",
+            "{} of {all} scans ({}): {}",
             scans.len(),
             scans.join(", "),
-            group.first,
-            scans[0]
+            group.of_all()
         ),
     }
 }
@@ -161,10 +160,13 @@ fn row_notes(rows: &[Row]) -> Vec<String> {
 /// Scan, what is to be known, which row.
 fn note(row: &Row) -> Option<(&str, String, String)> {
     let model = Model::of(row)?;
-    let words = match (&row.marks.note, row.converged()) {
-        (Some(note), _) => note.clone(),
-        (None, Some(false)) => "not converged".to_owned(),
-        (None, _) => return None,
+    // Warnings stand above all tables.
+    let said = parts(row.marks.note.as_deref()).filter(|part| !part.starts_with(WARNING));
+    let said: Vec<&str> = said.collect();
+    let words = match (said.is_empty(), row.converged()) {
+        (false, _) => said.join("; "),
+        (true, Some(false)) => "not converged".to_owned(),
+        (true, _) => return None,
     };
     let structure = row.key.structure.name().to_uppercase();
     Some((

@@ -29,6 +29,16 @@ const MARKERS: [MarkerShape; 7] = [
     MarkerShape::Star,
 ];
 
+/// Markers of groups: without the diamond, which is their mean.
+const GROUP_MARKERS: [MarkerShape; 6] = [
+    MarkerShape::Circle,
+    MarkerShape::Square,
+    MarkerShape::Triangle,
+    MarkerShape::TriangleDown,
+    MarkerShape::Pentagon,
+    MarkerShape::Star,
+];
+
 const DASHES: [&str; 4] = ["", "7 3", "2 3", "7 3 2 3"];
 
 /// Pixels of a PNG per unit of an SVG: 560 units print 85 mm wide at 460 dots per inch.
@@ -144,12 +154,16 @@ fn layout(figure: &Figure, plots: &[Plot]) -> Layout {
     if let Some([low, high]) = y_range(figure) {
         layout = layout.with_y_axis_min(low).with_y_axis_max(high);
     }
+    // The crate's own format rounds to three digits, so that even steps look uneven.
+    let ticks = |log: bool| if log { log_ticks() } else { exact_ticks() };
     if figure.x.log {
-        layout = layout.with_log_x().with_x_tick_format(plain_ticks());
+        layout = layout.with_log_x();
     }
     if figure.y.log {
-        layout = layout.with_log_y().with_y_tick_format(plain_ticks());
+        layout = layout.with_log_y();
     }
+    layout = layout.with_x_tick_format(ticks(figure.x.log));
+    layout = layout.with_y_tick_format(ticks(figure.y.log));
     layout
 }
 
@@ -201,10 +215,19 @@ fn nice([low, high]: [f64; 2]) -> [f64; 2] {
 }
 
 /// 0.1, 0.2, 10, 2e4: what a reader of a log axis expects, short enough for its last label to fit.
-fn plain_ticks() -> TickFormat {
+fn log_ticks() -> TickFormat {
     TickFormat::Custom(std::sync::Arc::new(|v| match v {
         v if (1e-4..1e4).contains(&v) => format!("{}", (v * 1e6).round() / 1e6),
         v => format!("{v:e}"),
+    }))
+}
+
+/// All digits of a tick of a linear axis.
+fn exact_ticks() -> TickFormat {
+    TickFormat::Custom(std::sync::Arc::new(|v| {
+        let digits = (v * 1e8).round() / 1e8;
+        // No minus before zero.
+        format!("{}", digits + 0.0)
     }))
 }
 
@@ -274,7 +297,7 @@ fn group_plots(at: f64, group: &GroupOfPoints) -> Vec<Plot> {
             .with_data(points)
             .with_color(hue)
             .with_size(3.5)
-            .with_marker(MARKERS[group.hue % MARKERS.len()]),
+            .with_marker(GROUP_MARKERS[group.hue % GROUP_MARKERS.len()]),
     )];
     if let Some(median) = group.median {
         plots.push(Plot::Line(

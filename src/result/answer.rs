@@ -83,8 +83,9 @@ pub fn best<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<&'a Row> {
             .then(a.3.cmp(&b.3))
             .then(a.4.total_cmp(&b.4))
     };
-    let answers =
-        |row: &&Row| row.load_carried().is_some() && row.key.elements != Some(Elements::SmoothedGrey);
+    let answers = |row: &&Row| {
+        row.load_carried().is_some() && row.key.elements != Some(Elements::SmoothedGrey)
+    };
     rows.into_iter().filter(answers).min_by(order)
 }
 
@@ -123,20 +124,21 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
     for warning in &facts.warnings {
         notes::add(&mut note, &format!("warning: {warning}"));
     }
-    let relative = match row.is_disconnected() {
-        true => Some(0.0),
-        false => row.error(),
-    };
+    // What does not join the loaded faces has a modulus of 0 whatever the elements: a threshold alone can change that, so no
+    // error is stated and no target met or missed.
+    let is_disconnected = row.is_disconnected();
+    let relative = row.error().filter(|_| !is_disconnected);
     AnswerLine {
         scan: key.scan.clone(),
         subject: row.marks.subject.clone(),
         group: row.marks.group.clone(),
         bv_tv: key.bv_tv,
         e_app_mpa: row.e_app_mpa(),
-        error_mpa: error,
+        error_mpa: error.filter(|_| !is_disconnected),
         error_percent: relative.map(|e| 100.0 * e),
         met: facts
             .target
+            .filter(|_| !is_disconnected)
             .map(|target| relative.is_some_and(|e| e <= target)),
         method: method_name(row),
         element_mm: key.lp_mm,
@@ -277,7 +279,7 @@ mod tests {
         let alone = answer_of(&[broken]);
         assert_eq!(
             (alone.e_app_mpa, alone.error_mpa, alone.met),
-            (Some(0.0), Some(0.0), Some(true))
+            (Some(0.0), None, None)
         );
     }
 

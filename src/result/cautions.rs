@@ -3,7 +3,7 @@
 
 use crate::result::notes;
 use crate::result::row::Row;
-use crate::result::settings::BoundaryRule;
+use crate::result::settings::{BoundaryRule, Conditions, Supports};
 
 /// How a caution begins in a row's note.
 pub const WARNING: &str = "warning: ";
@@ -19,7 +19,13 @@ const MOST_STRAIN: f64 = 0.1;
 
 /// What to warn of, of a specimen of this height along the load axis. None of it needs the solve.
 pub fn cautions(row: &Row, height_mm: f64) -> Vec<String> {
-    let found = [grips(row, height_mm), tissue(row), strain(row), coarse(row)];
+    let found = [
+        grips(row, height_mm),
+        tissue(row),
+        strain(row),
+        coarse(row),
+        upper_bound(row),
+    ];
     found.into_iter().flatten().collect()
 }
 
@@ -74,10 +80,18 @@ fn coarse(row: &Row) -> Option<String> {
     let thickness = row.marks.mean_thickness_mm.filter(|_| plain)?;
     (row.key.lp_mm > 0.5 * thickness).then(|| {
         format!(
-            "the lattice parameter of {} mm exceeds half the mean strut thickness ({:.3} mm): E_app is far from converged there",
+            "the lattice parameter of {} mm exceeds {:.3} mm, half of the mean strut thickness: E_app is far from converged there",
             row.key.lp_mm,
             0.5 * thickness
         )
+    })
+}
+
+/// A stiffness under kinematic conditions is no compression test.
+fn upper_bound(row: &Row) -> Option<String> {
+    (row.key.supports == Supports::Faces(Conditions::Kinematic)).then(|| {
+        "E_app follows from the stiffness under kinematic conditions, an upper bound: of a small specimen it can be several times the modulus of a compression test (--conditions mixed is nearer to it)"
+            .to_owned()
     })
 }
 

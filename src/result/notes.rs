@@ -46,6 +46,80 @@ pub fn without_numbers(note: &str) -> String {
 pub struct Alike {
     pub first: String,
     pub scans: Vec<String>,
+    /// The notes that differ from the first.
+    others: Vec<String>,
+}
+
+impl Alike {
+    /// The note with the range of each of its numbers over all scans; as the first scan has it, and whose numbers these are,
+    /// where the notes have unlike many numbers.
+    pub fn of_all(&self) -> String {
+        let all: Vec<Vec<Part>> = [&self.first]
+            .into_iter()
+            .chain(&self.others)
+            .map(|note| in_parts(note))
+            .collect();
+        let [first, others @ ..] = &all[..] else {
+            return self.first.clone();
+        };
+        let alike = |other: &Vec<Part>| other.len() == first.len();
+        if !others.iter().all(alike) {
+            return format!("{} (numbers of {})", self.first, self.scans[0]);
+        }
+        (0..first.len()).map(|at| range(&all, at)).collect()
+    }
+}
+
+/// A piece of a note.
+#[derive(Debug, Clone, Copy)]
+enum Part<'a> {
+    Text(&'a str),
+    Number(&'a str, f64),
+}
+
+/// A note as text and numbers.
+fn in_parts(note: &str) -> Vec<Part<'_>> {
+    let is_number = |c: char| c.is_ascii_digit() || c == '.';
+    let mut parts = Vec::new();
+    let mut rest = note;
+    while !rest.is_empty() {
+        let starts_number = rest.starts_with(|c: char| c.is_ascii_digit());
+        let end = match starts_number {
+            true => rest.find(|c| !is_number(c)),
+            false => rest.find(|c: char| c.is_ascii_digit()),
+        };
+        let (part, after) = rest.split_at(end.unwrap_or(rest.len()));
+        // A point at the end is the sentence's.
+        let digits = part.trim_end_matches('.');
+        match digits.parse().ok().filter(|_| starts_number) {
+            Some(value) => {
+                parts.push(Part::Number(digits, value));
+                rest = &rest[digits.len()..];
+            }
+            None => {
+                parts.push(Part::Text(part));
+                rest = after;
+            }
+        }
+    }
+    parts
+}
+
+/// The part at a place of all notes: its text, or the range of its numbers.
+fn range(notes: &[Vec<Part>], at: usize) -> String {
+    let mut numbers: Vec<(&str, f64)> = Vec::new();
+    for note in notes {
+        match note[at] {
+            Part::Text(text) => return text.to_owned(),
+            Part::Number(word, value) => numbers.push((word, value)),
+        }
+    }
+    numbers.sort_by(|a, b| a.1.total_cmp(&b.1));
+    match &numbers[..] {
+        [low, .., high] if low.1 < high.1 => format!("{} to {}", low.0, high.0),
+        [one, ..] => one.0.to_owned(),
+        [] => String::new(),
+    }
 }
 
 /// Notes by what they say, in the order of their first scans.
@@ -63,12 +137,16 @@ impl Alikes {
                 if !group.scans.iter().any(|s| s == scan) {
                     group.scans.push(scan.to_owned());
                 }
+                if group.first != note && !group.others.iter().any(|other| other == note) {
+                    group.others.push(note.to_owned());
+                }
                 false
             }
             None => {
                 let group = Alike {
                     first: note.to_owned(),
                     scans: vec![scan.to_owned()],
+                    others: Vec::new(),
                 };
                 self.groups.push((pattern, group));
                 true
@@ -97,6 +175,21 @@ mod tests {
         assert_eq!(found[0].scans, ["a", "b"]);
         assert_eq!(found[0].first, of("0.1, 0.12", "0.168"));
         assert_eq!(found.len(), 2);
+    }
+
+    #[test]
+    fn alike_notes_have_the_range_of_their_numbers() {
+        let mut notes = Alikes::default();
+        for (scan, voxels, share) in [("a", 2462, "12"), ("b", 9866, "54.5"), ("c", 30, "0.5")] {
+            notes.add(&format!("{voxels} voxels were removed, {share} %."), scan);
+        }
+        let found: Vec<String> = notes.groups().map(Alike::of_all).collect();
+        assert_eq!(found, ["30 to 9866 voxels were removed, 0.5 to 54.5 %."]);
+        let mut lists = Alikes::default();
+        lists.add("parameters 0.1, 0.12 mm", "a");
+        lists.add("parameters 0.12 mm", "b");
+        let found: Vec<String> = lists.groups().map(Alike::of_all).collect();
+        assert_eq!(found, ["parameters 0.1, 0.12 mm (numbers of a)"]);
     }
 
     #[test]

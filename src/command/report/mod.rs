@@ -111,7 +111,7 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
     report.notes.splice(0..0, failed);
     let pages = pages(rows, dirs);
     let mut files = render(&report, &pages, session)?;
-    files.extend(stiffness_table(&pages, dirs));
+    files.extend(stiffness_table(rows, &pages, dirs));
     let source = Source {
         recipe,
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -243,11 +243,17 @@ fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
 }
 
 /// `stiffness.csv`, where a scan has a stiffness.
-fn stiffness_table(pages: &[ScanPage], dirs: &[PathBuf]) -> Option<(String, Vec<u8>)> {
+fn stiffness_table(
+    rows: &[Row],
+    pages: &[ScanPage],
+    dirs: &[PathBuf],
+) -> Option<(String, Vec<u8>)> {
     let of = |page: &ScanPage| {
         let (dir, _) = folder(&page.scan, dirs)?;
         let record = crate::record::stiffness::record(&dir.join(RECORD))?;
-        Some(StiffnessLine::of(&record))
+        let marks = &rows.iter().find(|row| row.key.scan == page.scan)?.marks;
+        let (subject, group) = (marks.subject.clone(), marks.group.clone());
+        Some(StiffnessLine::of(&record, subject, group))
     };
     let lines: Vec<StiffnessLine> = pages.iter().filter_map(of).collect();
     (!lines.is_empty()).then(|| {

@@ -1,6 +1,6 @@
 //! Owns what the columns of the report's tables of groups and of stiffness mean.
 
-use super::{Column, SCAN, column};
+use super::{Column, GROUP, SCAN, SUBJECT, column};
 
 const QUANTITY: Column = column(
     "quantity",
@@ -29,7 +29,7 @@ pub const GROUPS: [Column; 10] = [
     column(
         "mean_error",
         "",
-        "mean of the stated errors of the scans; NA where a scan states none",
+        "mean of the subjects' stated errors, each the mean of its scans; NA where a scan states none",
     ),
 ];
 
@@ -85,9 +85,16 @@ pub const COMPARISONS: [Column; 17] = [
     column("widened_high", "", "difference_high in the same worst case"),
 ];
 
-pub const STIFFNESS: [Column; 13] = [
+pub const STIFFNESS: [Column; 19] = [
     SCAN,
+    SUBJECT,
+    GROUP,
     column("conditions", "", "boundary conditions of the unit strains"),
+    column(
+        "element_mm",
+        "mm",
+        "edge of an element; x;y;z where they differ",
+    ),
     column("bv_tv", "", "bone volume fraction, 0 to 1"),
     column(
         "e1_mpa",
@@ -111,4 +118,11 @@ pub const STIFFNESS: [Column; 13] = [
         "",
         "share of the tensor that no orthotropic tensor of this frame holds, 0 to 1",
     ),
+    column(
+        "axis1",
+        "",
+        "unit vector of the first axis in the axes of the scan, x;y;z",
+    ),
+    column("axis2", "", "the second axis"),
+    column("axis3", "", "the third axis"),
 ];

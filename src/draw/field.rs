@@ -96,11 +96,19 @@ fn range(values: &Volume<f32>) -> Option<Range> {
     found.iter_mut().for_each(|v| *v = v.abs());
     found.sort_unstable_by(f32::total_cmp);
     let last = found.len().checked_sub(1)?;
-    let high = f64::from(found[(SHOWN * last as f64) as usize]);
+    let high = rounded_up(f64::from(found[(SHOWN * last as f64) as usize]));
     Some(Range {
         low: if signed { -high } else { 0.0 },
         high,
     })
+}
+
+/// The next number whose thirds have few digits.
+fn rounded_up(value: f64) -> f64 {
+    let power = 10f64.powf(value.log10().floor());
+    let steps = [1.2, 1.5, 1.8, 2.4, 3.0, 3.6, 4.5, 6.0, 7.5, 9.0, 12.0];
+    let least = steps.into_iter().find(|step| step * power >= value);
+    least.map_or(value, |step| step * power)
 }
 
 #[cfg(test)]

@@ -62,7 +62,9 @@ impl Alike {
         let [first, others @ ..] = &all[..] else {
             return self.first.clone();
         };
-        let alike = |other: &Vec<Part>| other.len() == first.len();
+        let alike = |other: &Vec<Part>| {
+            other.len() == first.len() && first.iter().zip(other).all(|(a, b)| a.may_be_merged(b))
+        };
         if !others.iter().all(alike) {
             return format!("{} (numbers of {})", self.first, self.scans[0]);
         }
@@ -77,29 +79,34 @@ enum Part<'a> {
     Number(&'a str, f64),
 }
 
-/// A note as text and numbers.
+impl Part<'_> {
+    /// Two numbers, or one text.
+    fn may_be_merged(&self, other: &Part) -> bool {
+        match (self, other) {
+            (Part::Number(..), Part::Number(..)) => true,
+            (Part::Text(a), Part::Text(b)) => a == b,
+            _ => false,
+        }
+    }
+}
+
+/// A note as words and what is between them; a word that is a number, with a point, comma or bracket at its ends, is one.
 fn in_parts(note: &str) -> Vec<Part<'_>> {
-    let is_number = |c: char| c.is_ascii_digit() || c == '.';
     let mut parts = Vec::new();
-    let mut rest = note;
-    while !rest.is_empty() {
-        let starts_number = rest.starts_with(|c: char| c.is_ascii_digit());
-        let end = match starts_number {
-            true => rest.find(|c| !is_number(c)),
-            false => rest.find(|c: char| c.is_ascii_digit()),
-        };
-        let (part, after) = rest.split_at(end.unwrap_or(rest.len()));
-        // A point at the end is the sentence's.
-        let digits = part.trim_end_matches('.');
-        match digits.parse().ok().filter(|_| starts_number) {
-            Some(value) => {
-                parts.push(Part::Number(digits, value));
-                rest = &rest[digits.len()..];
-            }
-            None => {
-                parts.push(Part::Text(part));
-                rest = after;
-            }
+    for word in note.split_inclusive(' ') {
+        let digits = word.trim_matches(|c: char| !c.is_ascii_digit());
+        let at = word.find(digits).unwrap_or(0);
+        let (before, after) = (&word[..at], &word[at + digits.len()..]);
+        let is_name = [before, after]
+            .iter()
+            .any(|part| part.contains(|c: char| c.is_alphabetic() || c == '/'));
+        match digits.parse().ok().filter(|_| !is_name) {
+            Some(value) => parts.extend([
+                Part::Text(before),
+                Part::Number(digits, value),
+                Part::Text(after),
+            ]),
+            None => parts.push(Part::Text(word)),
         }
     }
     parts
@@ -190,6 +197,11 @@ mod tests {
         lists.add("parameters 0.12 mm", "b");
         let found: Vec<String> = lists.groups().map(Alike::of_all).collect();
         assert_eq!(found, ["parameters 0.1, 0.12 mm (numbers of a)"]);
+        let mut names = Alikes::default();
+        names.add("kept in c1/results.old.csv", "c1");
+        names.add("kept in c2/results.old.csv", "c2");
+        let found: Vec<String> = names.groups().map(Alike::of_all).collect();
+        assert_eq!(found, ["kept in c1/results.old.csv (numbers of c1)"]);
     }
 
     #[test]

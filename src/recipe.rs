@@ -215,7 +215,10 @@ mod tests {
             assert_eq!(built_in(name).unwrap(), *text);
         }
         for (name, _) in SCENES {
-            assert!(built_in::any(name).is_ok() && built_in(name).is_err(), "{name}");
+            assert!(
+                built_in::any(name).is_ok() && built_in(name).is_err(),
+                "{name}"
+            );
         }
         assert!(
             built_in("papre")
@@ -231,7 +234,10 @@ mod tests {
         let loads: Vec<Load> = recipe.solves().iter().map(|solve| solve.load).collect();
         assert_eq!(loads, [Load::Uniaxial, Load::ShearX]);
         for (text, said) in [
-            ("loads = [\"uniaxial\", \"torsion\"]\n[solve]\nfields = [\"sed\"]", "overwrite"),
+            (
+                "loads = [\"uniaxial\", \"torsion\"]\n[solve]\nfields = [\"sed\"]",
+                "overwrite",
+            ),
             ("loads = [\"shear-z\"]", "along the long axis"),
             ("error = 0.1\nloads = [\"torsion\"]", "torsion has none"),
         ] {

@@ -73,7 +73,8 @@ fn a_square_bar_twists_as_saint_venant_says() {
     let shear = 1000.0 / 2.6;
     // J of a square: 0.140577 a⁴ (Timoshenko & Goodier 1970, § 109).
     let exact = 1.0 / (shear * 0.140_577);
-    let found = [2, 4, 8].map(|n| compliance(Load::Torsion, n, 4) - compliance(Load::Torsion, n, 3));
+    let found =
+        [2, 4, 8].map(|n| compliance(Load::Torsion, n, 4) - compliance(Load::Torsion, n, 3));
     assert_second_order(found, exact, 0.02);
 }
 
@@ -126,7 +127,10 @@ fn every_axis_is_like_every_other() {
     for (turn, load) in kinds {
         let [x, y, z] = AXES.map(|axis| of(axis, turn, load));
         // Twice the energy's tolerance: each is off to second order.
-        assert!((y / x - 1.0).abs() < 1e-8 && (z / x - 1.0).abs() < 1e-8, "{x} {y} {z}");
+        assert!(
+            (y / x - 1.0).abs() < 1e-8 && (z / x - 1.0).abs() < 1e-8,
+            "{x} {y} {z}"
+        );
     }
 }
 
@@ -150,7 +154,11 @@ fn assert_balance(ends: &[EndForces], what: &str) {
     let forces = norm(add(lower.force_n(), upper.force_n()));
     let moments = norm(add(moment(lower), moment(upper)));
     assert!(forces < 1e-6 * force, "{what}: {forces} of {force}");
-    assert!(moments < 1e-6 * force * arm, "{what}: {moments} of {}", force * arm);
+    assert!(
+        moments < 1e-6 * force * arm,
+        "{what}: {moments} of {}",
+        force * arm
+    );
 }
 
 /// What does the work at the ends, from the sums of the nodal forces.
@@ -191,7 +199,10 @@ fn ends_balance_and_their_work_is_the_energy() {
             let energy = work.force_n.or(work.moment_nmm).unwrap();
             let reaction = worked(ends, &params);
             // Reactions are off to first order: the root of the energy's tolerance.
-            assert!((reaction / energy - 1.0).abs() < 1e-6, "{what}: {reaction} {energy}");
+            assert!(
+                (reaction / energy - 1.0).abs() < 1e-6,
+                "{what}: {reaction} {energy}"
+            );
             assert_eq!(load.has_modulus(), solved.moduli.e_app_mpa.is_finite());
         }
     }
@@ -228,7 +239,10 @@ fn lattices_balance_too() {
             if !(load == Load::Uniaxial && boundary == Boundary::Firm) {
                 let energy = solved.work.force_n.or(solved.work.moment_nmm).unwrap();
                 let reaction = worked(ends, &params);
-                assert!((reaction / energy - 1.0).abs() < 1e-5, "{what}: {reaction} {energy}");
+                assert!(
+                    (reaction / energy - 1.0).abs() < 1e-5,
+                    "{what}: {reaction} {energy}"
+                );
             }
         }
     }
@@ -263,7 +277,9 @@ fn tissues_carry_what_their_moduli_say() {
     };
     let (_, recorded) = solve(&bone, &params(Load::Uniaxial));
     let share = |sections: &[SectionShare], section: &str, label: &str| {
-        let own = sections.iter().find(|s| s.section == section && s.label == label);
+        let own = sections
+            .iter()
+            .find(|s| s.section == section && s.label == label);
         own.unwrap().share
     };
     for section in ["lower", "middle", "upper"] {
@@ -283,14 +299,20 @@ fn tissues_carry_what_their_moduli_say() {
     // Half of the bone at 0.05 and half at 0.15 MPa.
     assert!((spread("all", "sed").sd - 0.05).abs() < 1e-6);
     assert!((spread("100", "principal_strain_1").median - 0.01).abs() < 1e-7);
-    assert_eq!((spread("100", "sed").elements, spread("all", "sed").elements), (96, 192));
+    assert_eq!(
+        (spread("100", "sed").elements, spread("all", "sed").elements),
+        (96, 192)
+    );
     for load in [Load::Torsion, Load::ShearX, Load::BendingX] {
         let (solved, recorded) = solve(&bone, &params(load));
         let work = solved.work.force_n.or(solved.work.moment_nmm).unwrap();
         for section in &recorded.details.sections {
             if section.label == "all" && load != Load::BendingX {
                 let carried = section.force_n.or(section.moment_nmm).unwrap();
-                assert!((carried.abs() / work - 1.0).abs() < 1e-4, "{section:?} {work}");
+                assert!(
+                    (carried.abs() / work - 1.0).abs() < 1e-4,
+                    "{section:?} {work}"
+                );
             }
         }
         let own = |labels: Vec<i32>| {
@@ -351,13 +373,24 @@ fn symmetric_shears_make_a_stiffness() {
             _ => panic!("no stiffness"),
         }
     };
-    let solid = stiffness(&specimen([4, 5, 6], [0.02; 3], |_| true), Conditions::Symshear);
+    let solid = stiffness(
+        &specimen([4, 5, 6], [0.02; 3], |_| true),
+        Conditions::Symshear,
+    );
     for i in 3..6 {
-        assert!((solid[i][i] / (1000.0 / 2.6) - 1.0).abs() < 1e-6, "{}", solid[i][i]);
+        assert!(
+            (solid[i][i] / (1000.0 / 2.6) - 1.0).abs() < 1e-6,
+            "{}",
+            solid[i][i]
+        );
     }
     let bone = crate::laws::irregular_specimen();
-    let [symshear, mixed, kinematic] =
-        [Conditions::Symshear, Conditions::Mixed, Conditions::Kinematic].map(|c| stiffness(&bone, c));
+    let [symshear, mixed, kinematic] = [
+        Conditions::Symshear,
+        Conditions::Mixed,
+        Conditions::Kinematic,
+    ]
+    .map(|c| stiffness(&bone, c));
     for i in 0..3 {
         for j in 0..3 {
             assert!((symshear[i][j] / mixed[i][j] - 1.0).abs() < 1e-6);
@@ -422,12 +455,18 @@ fn rows_and_files_hold_forces_and_moments() {
     };
     let shear = json("shear-x", &["--failure"]);
     assert!(shear["e_app_mpa"].is_null() && shear["moment_nmm"].is_null());
-    let (force, k) = (shear["force_n"].as_f64(), shear["stiffness_n_per_mm"].as_f64());
+    let (force, k) = (
+        shear["force_n"].as_f64(),
+        shear["stiffness_n_per_mm"].as_f64(),
+    );
     // 1 % of 0.2 mm.
     assert!((force.unwrap() / (k.unwrap() * 0.002) - 1.0).abs() < 1e-12);
     let torsion = json("torsion", &["--angle-deg", "2"]);
     assert!(torsion["force_n"].is_null() && torsion["strain"].as_f64() == Some(0.0));
-    assert_eq!((&torsion["angle_deg"], &torsion["ends"]), (&2.0.into(), &"bonded".into()));
+    assert_eq!(
+        (&torsion["angle_deg"], &torsion["ends"]),
+        (&2.0.into(), &"bonded".into())
+    );
     let answer: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(path("out/answer.json")).unwrap()).unwrap();
     assert_eq!(answer["moment_nmm"], torsion["moment_nmm"]);
@@ -438,7 +477,10 @@ fn rows_and_files_hold_forces_and_moments() {
     assert_eq!(failure.lines().count(), 8, "{failure}");
     // A kept row keeps its tables.
     ok(&[&solve[..], &["torsion", "--angle-deg", "2"]].concat());
-    assert_eq!(std::fs::read_to_string(path("out/reactions.csv")).unwrap(), reactions);
+    assert_eq!(
+        std::fs::read_to_string(path("out/reactions.csv")).unwrap(),
+        reactions
+    );
     let report = path("report");
     ok(&["report", &out, "-o", &report]);
     let page = std::fs::read_to_string(path("report/report.html")).unwrap();

@@ -6,11 +6,9 @@ use bonepd_ct::command::{Outcome, run_settings};
 use bonepd_ct::error::Result;
 use bonepd_ct::grid::Axis;
 use bonepd_ct::machine::session::Session;
-use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::checks::needs_modulus;
-use bonepd_ct::pipeline::apparent::{
-    CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams,
-};
+use bonepd_ct::pipeline::apparent::fields::Field;
+use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -121,7 +119,12 @@ pub struct SolveSettings {
     #[arg(long, value_name = "STRAIN", value_parser = words::positive, requires = "failure")]
     critical_strain: Option<f64>,
     /// Only the bone of these labels counts in that criterion, comma-separated
-    #[arg(long, value_name = "LABELS", value_delimiter = ',', requires = "failure")]
+    #[arg(
+        long,
+        value_name = "LABELS",
+        value_delimiter = ',',
+        requires = "failure"
+    )]
     failure_labels: Vec<i32>,
 }
 

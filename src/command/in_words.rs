@@ -32,13 +32,16 @@ fn answered(row: &Row) -> String {
     let error = solved
         .algebraic_error_percent
         .map_or(String::new(), |p| format!(" (solver ± {p:.3} %)"));
-    match (solved.moment_nmm, solved.force_n.zip(solved.stiffness_n_per_mm)) {
+    match (
+        solved.moment_nmm,
+        solved.force_n.zip(solved.stiffness_n_per_mm),
+    ) {
         (Some(moment), _) => format!("{load} moment {moment:.3} N mm{error}"),
         (None, Some((force, k))) if !row.key.load.has_modulus() => {
             format!("{load} force {force:.3} N, stiffness {k:.3} N/mm{error}")
         }
         (None, Some((force, k))) => {
-            format!("E_app {}  K {k:.6} N/mm, F {force:.6} N", modulus(row))
+            format!("E_app {}  K {k:.3} N/mm, F {force:.3} N", modulus(row))
         }
         _ => format!("E_app {}", modulus(row)),
     }

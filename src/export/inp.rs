@@ -5,9 +5,9 @@ use crate::discretisation::voxels::{Planes, VoxelMesh};
 use crate::error::{Error, Result};
 use crate::export::bins::Bins;
 use crate::io::atomic;
+use crate::measure::apparent::Loaded;
 use crate::operator::held::Held;
 use crate::pipeline::apparent::discretisation::Prepared;
-use crate::measure::apparent::Loaded;
 use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
@@ -121,9 +121,9 @@ fn said(motion: &EndMotion, params: &SolveParams) -> String {
     } = motion.loaded;
     let [x, y, z] = motion.middle_at(gauge_mm);
     match motion.motion {
-        Motion::Along => format!(
-            "E_app = force of HIGH x {gauge_mm} mm / (area x {displacement_mm} mm)"
-        ),
+        Motion::Along => {
+            format!("E_app = force of HIGH x {gauge_mm} mm / (area x {displacement_mm} mm)")
+        }
         Motion::Sideways(direction) => format!(
             "force of HIGH along {} moves it by {displacement_mm} mm",
             direction.name()
@@ -145,7 +145,12 @@ fn fill(
     let axis = params.axis.index();
     let held = supports::held(mesh, grips, motion, params.load);
     let u = supports::start(mesh, grips, motion);
-    writeln!(out, "** {} elements; mm, N, MPa; {}", mesh.elements, said(motion, params))?;
+    writeln!(
+        out,
+        "** {} elements; mm, N, MPa; {}",
+        mesh.elements,
+        said(motion, params)
+    )?;
     writeln!(out, "*NODE, NSET=ALL")?;
     let nodes = || (0..mesh.len()).filter(|&node| mesh.around[node] != 0);
     for node in nodes() {

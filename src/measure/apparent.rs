@@ -45,7 +45,11 @@ pub struct EndWork {
 impl EndWork {
     /// From twice the elastic energy `uᵀKu = F u` of ends that come nearer, part or slide by `displacement_mm`. Off to second
     /// order in the algebraic error.
-    pub fn of_displacement(twice_energy_nmm: f64, displacement_mm: f64, relative_error: f64) -> Self {
+    pub fn of_displacement(
+        twice_energy_nmm: f64,
+        displacement_mm: f64,
+        relative_error: f64,
+    ) -> Self {
         let stiffness = twice_energy_nmm / displacement_mm.powi(2);
         EndWork {
             force_n: Some((stiffness * displacement_mm).abs()),

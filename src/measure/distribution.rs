@@ -72,7 +72,10 @@ mod tests {
     fn a_hundred_numbers_have_their_moments_and_percentiles() {
         let values: Vec<(f32, f32)> = (1..=100).map(|i| (i as f32, 1.0)).collect();
         let d = distribution(values).unwrap();
-        assert_eq!((d.p5, d.p25, d.median, d.p75, d.p95), (5.0, 25.0, 50.0, 75.0, 95.0));
+        assert_eq!(
+            (d.p5, d.p25, d.median, d.p75, d.p95),
+            (5.0, 25.0, 50.0, 75.0, 95.0)
+        );
         assert_eq!((d.minimum, d.maximum, d.count), (1.0, 100.0, 100));
         // Variance of 1 to n: (n² − 1) / 12.
         assert!((d.mean - 50.5).abs() < 1e-12 && (d.sd - (9999.0f64 / 12.0).sqrt()).abs() < 1e-12);

@@ -1,6 +1,6 @@
 //! Owns the data dictionary of the tidy tables beside `results.csv`.
 
-use crate::record::columns::{
+use crate::record::column::{
     ANGLE, AXIS, BOUNDARY, Column, ENDS, FAILURE_DISPLACEMENT, FAILURE_FACTOR, FAILURE_LOAD,
     FAILURE_MOMENT, FAILURE_STRAIN, File, GRIP, LOAD, LP, METHOD, POISSON, SCAN, SED, STRAIN,
     STRUCTURE, YOUNG, column,
@@ -17,7 +17,11 @@ const fn with<const N: usize>(own: &[Column]) -> [Column; N] {
     let mut all = [SCAN; N];
     let mut i = 0;
     while i < N {
-        all[i] = if i < OF.len() { OF[i] } else { own[i - OF.len()] };
+        all[i] = if i < OF.len() {
+            OF[i]
+        } else {
+            own[i - OF.len()]
+        };
         i += 1;
     }
     all
@@ -25,7 +29,7 @@ const fn with<const N: usize>(own: &[Column]) -> [Column; N] {
 
 pub const REACTIONS: File = File {
     name: "reactions.csv",
-    about: "forces and moments that the supports put on both ends, one line an end; signed, along the specimen's axes",
+    about: "forces and moments that the supports put on both ends, one line an end; signed, along the specimen's axes; off to first order in the solver's error, so solve with --tolerance 1e-8 where they must balance",
     columns: &with::<24>(&[
         column("end", "", "lower or upper, along the long axis"),
         column("force_x_n", "N", "of the supports on the end"),
@@ -65,7 +69,11 @@ pub const FAILURE: File = File {
             "share of the bone that must exceed the critical strain",
         ),
         column("critical_strain", "", "effective strain sqrt(2 SED / E)"),
-        column("labels", "", "labels whose bone counts; all for every voxel"),
+        column(
+            "labels",
+            "",
+            "labels whose bone counts; all for every voxel",
+        ),
         column(
             "strain_at_volume",
             "",

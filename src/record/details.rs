@@ -77,6 +77,13 @@ pub fn write<'a>(
     table_of::<TissueSpread>(&dir.join(TISSUE), rows, |d| &d.tissue)
 }
 
+/// Removes the tables in `dir`, whose rows are set aside.
+pub fn remove(dir: &Path) {
+    for table in [REACTIONS, FAILURE, SECTIONS, TISSUE] {
+        let _ = std::fs::remove_file(dir.join(table));
+    }
+}
+
 fn table_of<'a, T: Clone + Default + Serialize + 'a>(
     path: &Path,
     rows: impl Iterator<Item = (&'a Settings, &'a Details)>,

@@ -26,8 +26,9 @@ const RECORD: &str = "results.json";
 const OLD_TABLE: &str = "results.old.csv";
 
 /// Renames `results.csv`, whose rows no longer belong to what else is in the folder, so that nothing takes them for
-/// current. True if there was one.
+/// current; tables beside it go. True if there was one.
 pub fn set_aside(dir: &Path) -> bool {
+    details::remove(dir);
     std::fs::rename(dir.join(TABLE), dir.join(OLD_TABLE)).is_ok()
 }
 
@@ -235,7 +236,10 @@ impl Results {
         let text = serde_json::to_string_pretty(&record).expect("plain data");
         atomic::write(&self.dir.join(RECORD), text)?;
         let details = self.record.rows.iter();
-        details::write(&self.dir, details.map(|keyed| (&keyed.row.key, &keyed.details)))?;
+        details::write(
+            &self.dir,
+            details.map(|keyed| (&keyed.row.key, &keyed.details)),
+        )?;
         write_table(&self.dir, &rows)
     }
 }
@@ -320,10 +324,20 @@ mod tests {
         let params = SolveParams::default();
         let mut results = Results::open(dir.path(), false).unwrap();
         results
-            .store(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0), Details::default())
+            .store(
+                &blank(FIRM),
+                &params,
+                &solved(FIRM, 1.0 / 3.0),
+                Details::default(),
+            )
             .unwrap();
         results
-            .store(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1), Details::default())
+            .store(
+                &blank(FLOPPY),
+                &params,
+                &solved(FLOPPY, 0.1),
+                Details::default(),
+            )
             .unwrap();
 
         let again = Results::open(dir.path(), false).unwrap();
@@ -362,10 +376,17 @@ mod tests {
         let mut results = Results::open(dir.path(), false).unwrap();
         let mut stalled = solved(FIRM, 2.0);
         stalled.solved.as_mut().unwrap().converged = Some(false);
-        results.store(&blank(FIRM), &params, &stalled, Details::default()).unwrap();
+        results
+            .store(&blank(FIRM), &params, &stalled, Details::default())
+            .unwrap();
         assert_eq!(results.find(&blank(FIRM), &params), None);
         results
-            .store(&blank(FIRM), &params, &solved(FIRM, 1.0), Details::default())
+            .store(
+                &blank(FIRM),
+                &params,
+                &solved(FIRM, 1.0),
+                Details::default(),
+            )
             .unwrap();
         let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
         assert_eq!(table, [solved(FIRM, 1.0)]);

@@ -83,8 +83,9 @@ pub fn best<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<&'a Row> {
             .then(a.3.cmp(&b.3))
             .then(a.4.total_cmp(&b.4))
     };
-    let answers =
-        |row: &&Row| row.load_carried().is_some() && row.key.elements != Some(Elements::SmoothedGrey);
+    let answers = |row: &&Row| {
+        row.load_carried().is_some() && row.key.elements != Some(Elements::SmoothedGrey)
+    };
     rows.into_iter().filter(answers).min_by(order)
 }
 

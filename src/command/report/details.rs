@@ -38,7 +38,9 @@ pub(super) fn tables(dir: &Path) -> Vec<(String, Table)> {
             table(&all, |d| &d.ends),
         ),
     ];
-    let filled = found.into_iter().filter(|(_, table)| !table.body.is_empty());
+    let filled = found
+        .into_iter()
+        .filter(|(_, table)| !table.body.is_empty());
     filled
         .map(|(caption, table)| (caption.to_owned(), table))
         .collect()

@@ -87,7 +87,11 @@ pub fn write_field(path: &Path, components: &[Volume<f32>], about: &str) -> Resu
         put(68, 1007);
     }
     let mut parts: Vec<&[u8]> = vec![&header];
-    parts.extend(components.iter().map(|c| bytemuck::cast_slice(c.as_slice())));
+    parts.extend(
+        components
+            .iter()
+            .map(|c| bytemuck::cast_slice(c.as_slice())),
+    );
     atomic::write_with(path, |out| gzip::write(out, &parts))
 }
 

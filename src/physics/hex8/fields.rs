@@ -58,7 +58,13 @@ impl<F: Fn(usize) -> (f32, u8) + Sync> Deformed<'_, F> {
         let of_row = |s: &Segment| -> Vec<T> {
             let brick = |p: Placed| {
                 let element = self.mesh.grid.index(p.at);
-                read(&brick(element, h, &matrices[p.kind], self.kinds[p.kind], &p))
+                read(&brick(
+                    element,
+                    h,
+                    &matrices[p.kind],
+                    self.kinds[p.kind],
+                    &p,
+                ))
             };
             self.placed(s).map(brick).collect()
         };
@@ -68,7 +74,11 @@ impl<F: Fn(usize) -> (f32, u8) + Sync> Deformed<'_, F> {
 
     /// The forces (N) at the corners of every element of one layer across an axis: element, its indices, forces by corner
     /// `cx + 2 cy + 4 cz`.
-    pub fn layer_forces(&self, axis: usize, layer: usize) -> Vec<(usize, [usize; 3], [[f64; 3]; 8])> {
+    pub fn layer_forces(
+        &self,
+        axis: usize,
+        layer: usize,
+    ) -> Vec<(usize, [usize; 3], [[f64; 3]; 8])> {
         let matrices = self.matrices();
         let of_row = |s: &Segment| -> Vec<_> {
             let inside = self.placed(s).filter(|p| p.at[axis] == layer);
@@ -121,7 +131,9 @@ fn brick(
     (young, nu, _): Kind,
     placed: &Placed,
 ) -> Brick {
-    let Placed { factor, corners, .. } = placed;
+    let Placed {
+        factor, corners, ..
+    } = placed;
     let forces = forces(k, *factor, corners);
     let pairs = forces.as_flattened().iter().zip(corners.as_flattened());
     let twice_energy: f64 = pairs.map(|(f, u)| f * u).sum();

@@ -100,7 +100,10 @@ fn check_recorded(params: &SolveParams) -> Result<()> {
             "add --load uniaxial, confined or another single load, or leave --fields, --statistics and --failure out",
         );
     }
-    let of_elements = params.fields.iter().any(|field| !Field::OF_LATTICES.contains(field));
+    let of_elements = params
+        .fields
+        .iter()
+        .any(|field| !Field::OF_LATTICES.contains(field));
     if params.method == Method::Lattice && (numbers || of_elements) {
         return wrong(
             "strains, stresses, statistics and the failure load come from voxel elements: a lattice has bonds, and no strain at its sites",
@@ -154,7 +157,10 @@ fn check_motion(params: &SolveParams) -> Result<()> {
     if matches!(params.load.motion(), Some(Motion::Tilt(_))) && params.grip_mm > 0.0 {
         return wrong(
             "grip_mm",
-            format!("{load} tilts the end planes, and grips of {} mm would shear", params.grip_mm),
+            format!(
+                "{load} tilts the end planes, and grips of {} mm would shear",
+                params.grip_mm
+            ),
             "leave --grip-mm out",
         );
     }
@@ -171,7 +177,10 @@ pub fn needs_modulus(load: Load, key: &str) -> Result<()> {
     }
     Err(Error::setting(
         key,
-        format!("--error states the error of E_app, and {} has none", load.name()),
+        format!(
+            "--error states the error of E_app, and {} has none",
+            load.name()
+        ),
         "leave --error out (the row states the solver's error), or use --load uniaxial",
     ))
 }

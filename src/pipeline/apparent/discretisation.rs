@@ -1,10 +1,10 @@
 //! Owns the seam: what a solve needs of a three-dimensional discretisation of a specimen.
 
 use crate::error::Result;
+use crate::measure::apparent::EndWork;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
-use crate::measure::apparent::EndWork;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;

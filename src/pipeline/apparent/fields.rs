@@ -4,8 +4,8 @@
 use crate::discretisation::lattice::placement::Frame;
 use crate::measure::surface_energy::SurfaceEnergy;
 use crate::result::details::{Details, FailureAt};
-use crate::volume::Volume;
 use crate::solver::cg::CgInfo;
+use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
 /// Displacements (mm) in equilibrium and the nodal forces (N) that they take.

@@ -2,7 +2,9 @@
 
 use crate::grid::Axis;
 use crate::result::row::{FailureLoad, Marks, Row, Solution};
-use crate::result::settings::{BoundaryRule, CellType, Elements, Load, Method, Sed, Settings, Supports};
+use crate::result::settings::{
+    BoundaryRule, CellType, Elements, Load, Method, Sed, Settings, Supports,
+};
 use serde::{Deserialize, Serialize};
 
 /// A row as files hold it. What the columns mean is at the fields of [`Settings`], [`Solution`] and [`Marks`].

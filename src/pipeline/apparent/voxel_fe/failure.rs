@@ -7,7 +7,12 @@ use crate::pipeline::apparent::params::SolveParams;
 use crate::result::details::FailureAt;
 
 /// What a failure means of the load applied.
-pub fn at(failure: &Failure, params: &SolveParams, motion: &EndMotion, work: &EndWork) -> FailureAt {
+pub fn at(
+    failure: &Failure,
+    params: &SolveParams,
+    motion: &EndMotion,
+    work: &EndWork,
+) -> FailureAt {
     let factor = failure.factor;
     let by_angle = motion.motion.is_by_angle();
     let labels: Vec<String> = params.failure_labels.iter().map(i32::to_string).collect();
@@ -22,8 +27,7 @@ pub fn at(failure: &Failure, params: &SolveParams, motion: &EndMotion, work: &En
         factor,
         failure_load_n: work.force_n.map(|f| factor * f),
         failure_moment_nmm: work.moment_nmm.map(|m| factor * m),
-        failure_displacement_mm: (!by_angle)
-            .then(|| factor * motion.loaded.displacement_mm.abs()),
+        failure_displacement_mm: (!by_angle).then(|| factor * motion.loaded.displacement_mm.abs()),
         failure_strain: (!by_angle).then(|| factor * params.strain.abs()),
         failure_angle_deg: by_angle.then(|| factor * params.angle_deg.abs()),
     }

@@ -41,12 +41,15 @@ pub fn principal_fields(
         place: Place::Voxels,
         about: "principal values at element centres, largest first".to_owned(),
     };
-    let of_directions = directions.into_iter().enumerate().map(|(k, d)| FieldVolume {
-        name: format!("{name}_direction_{}", k + 1),
-        components: d.into_iter().map(volume).collect(),
-        labels: AXES,
-        place: Place::Voxels,
-        about: "unit vector along the specimen's x, y, z".to_owned(),
-    });
+    let of_directions = directions
+        .into_iter()
+        .enumerate()
+        .map(|(k, d)| FieldVolume {
+            name: format!("{name}_direction_{}", k + 1),
+            components: d.into_iter().map(volume).collect(),
+            labels: AXES,
+            place: Place::Voxels,
+            about: "unit vector along the specimen's x, y, z".to_owned(),
+        });
     [of_values].into_iter().chain(of_directions).collect()
 }

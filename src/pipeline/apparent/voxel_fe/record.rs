@@ -97,7 +97,9 @@ impl<'a> Recorder<'a> {
     }
 
     fn fraction(&self, element: usize) -> f32 {
-        self.fractions.as_ref().map_or(1.0, |f| f.as_slice()[element])
+        self.fractions
+            .as_ref()
+            .map_or(1.0, |f| f.as_slice()[element])
     }
 
     /// Label of an element, which is one voxel or a part of one.
@@ -131,13 +133,16 @@ impl<'a> Recorder<'a> {
         }
         let deformed = self.deformed();
         let known = self.model.labels.as_ref().map_or(&[][..], |l| &l.values);
-        let name = |e: usize| self.label(e).map_or(ALL.to_owned(), |label| label.to_string());
+        let name = |e: usize| {
+            self.label(e)
+                .map_or(ALL.to_owned(), |label| label.to_string())
+        };
         Details {
             sections: sections(&deformed, self.model.grips, &self.model.motion, &name),
             tissue: tissue_spread::spread(
                 &deformed,
                 self.params.sed,
-                known,
+                several,
                 &|e| self.label(e),
                 &|e| self.fraction(e),
             ),
@@ -189,7 +194,12 @@ impl<'a> Recorder<'a> {
                 let components = self.on_voxels(scan, |b| b.displacement_mm);
                 let names = components.into_iter().zip(AXES).map(|(component, axis)| {
                     let about = format!("displacement along {axis} in mm at element centres");
-                    one(&format!("displacement_{axis}_mm"), vec![component], &[], about)
+                    one(
+                        &format!("displacement_{axis}_mm"),
+                        vec![component],
+                        &[],
+                        about,
+                    )
                 });
                 names.collect()
             }
@@ -209,7 +219,12 @@ impl<'a> Recorder<'a> {
             }),
             Field::Strain => {
                 let about = format!("{order}; shears are engineering shears");
-                vec![one("strain", self.on_voxels(scan, |b| b.strain), TENSOR, about)]
+                vec![one(
+                    "strain",
+                    self.on_voxels(scan, |b| b.strain),
+                    TENSOR,
+                    about,
+                )]
             }
             Field::Stress => {
                 let stress = self.on_voxels(scan, |b| b.stress_mpa);
@@ -257,7 +272,11 @@ impl<'a> Recorder<'a> {
             }
         }
         let [hx, hy, hz] = mesh.grid.spacing_mm;
-        let straight = [[hx, 0.0, 0.0, 0.0], [0.0, hy, 0.0, 0.0], [0.0, 0.0, hz, 0.0]];
+        let straight = [
+            [hx, 0.0, 0.0, 0.0],
+            [0.0, hy, 0.0, 0.0],
+            [0.0, 0.0, hz, 0.0],
+        ];
         let affine = bone.affine.unwrap_or(straight);
         let affine = affine.map(|[x, y, z, o]| [x, y, z, o - 0.5 * (x + y + z)]);
         let volume = |values| Volume {

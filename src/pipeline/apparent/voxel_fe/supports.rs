@@ -41,11 +41,7 @@ pub fn start(mesh: &VoxelMesh, grips: Planes, motion: &EndMotion) -> Displacemen
 }
 
 /// Calls `visit` with every node of the gripped planes, which end it is of, and its place in mm.
-pub fn each_end_node(
-    mesh: &VoxelMesh,
-    grips: Planes,
-    visit: &mut dyn FnMut(usize, End, [f64; 3]),
-) {
+pub fn each_end_node(mesh: &VoxelMesh, grips: Planes, visit: &mut dyn FnMut(usize, End, [f64; 3])) {
     let (axis, h) = (grips.axis.index(), mesh.grid.spacing_mm);
     each_node(mesh, |node, at| {
         let end = match at[axis] {

@@ -43,7 +43,9 @@ pub fn spread<F: Fn(usize) -> (f32, u8) + Sync>(
     let mut lines = Vec::new();
     for tissue in tissues {
         for (i, (quantity, unit)) in QUANTITIES.into_iter().enumerate() {
-            let own = elements.iter().filter(|(l, ..)| tissue.is_none() || l.as_ref() == tissue);
+            let own = elements
+                .iter()
+                .filter(|(l, ..)| tissue.is_none() || l.as_ref() == tissue);
             let Some(d) = distribution(own.map(|(_, f, v)| (v[i], *f)).collect()) else {
                 continue;
             };

@@ -2,6 +2,7 @@
 
 use crate::result::answer::AnswerLine;
 use crate::result::cautions::WARNING;
+use crate::result::details::Details;
 use crate::result::notes;
 use crate::result::row::{FailureLoad, Row};
 use crate::result::settings::BoundaryRule;
@@ -57,6 +58,22 @@ fn failure(failure: &FailureLoad) -> String {
         (None, Some(moment)) => format!("  failure moment {moment:.3} N mm"),
         (None, None) => String::new(),
     }
+}
+
+/// What each tissue carries at both ends and in the middle, in a line; None where it was not asked for or there is one tissue.
+pub fn sections_in_words(details: &Details) -> Option<String> {
+    let of = |section: &str| {
+        let own = details.sections.iter().filter(|s| s.section == section);
+        let tissues = own.filter(|s| s.label != "all");
+        let shares = tissues.map(|s| format!("label {} {:.1} %", s.label, 100.0 * s.share));
+        let shares: Vec<String> = shares.collect();
+        (!shares.is_empty()).then(|| format!("{section} {}", shares.join(", ")))
+    };
+    let found: Vec<String> = ["lower", "middle", "upper"]
+        .into_iter()
+        .filter_map(of)
+        .collect();
+    (!found.is_empty()).then(|| format!("  load carried: {}", found.join("; ")))
 }
 
 /// The modulus, with everything that is stated of it and of what that is made.

@@ -122,3 +122,4 @@ pub(super) const SED: Column = column(
     "",
     "strain energy density of elements, of which effective strains and failure follow: centre (of the strain at the centre) or mean (energy over volume)",
 );
+pub(super) const TOLERANCE: Column = column("tolerance", "", "relative algebraic error allowed");

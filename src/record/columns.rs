@@ -3,7 +3,7 @@
 use crate::record::column::{
     ANGLE, AXIS, BOUNDARY, BV_TV, ENDS, FAILURE_DISPLACEMENT, FAILURE_FACTOR, FAILURE_LOAD,
     FAILURE_MOMENT, FAILURE_STRAIN, FORCE, GRIP, GROUP, LOAD, LP, METHOD, MOMENT, POISSON, SCAN,
-    SED, STIFFNESS, STRAIN, STRUCTURE, SUBJECT, YOUNG, column,
+    SED, STIFFNESS, STRAIN, STRUCTURE, SUBJECT, TOLERANCE, YOUNG, column,
 };
 pub use crate::record::column::{Column, File};
 use crate::record::detail_columns;
@@ -164,7 +164,7 @@ const RESULTS: [Column; 56] = [
         "mm",
         "quick estimate of strut thickness, 2 BV / BS (of plates); tb_th_mm is measured by spheres and larger",
     ),
-    column("tolerance", "", "relative algebraic error allowed"),
+    TOLERANCE,
     column("note", "", "what a reader must know of this row"),
     GROUP,
     SUBJECT,

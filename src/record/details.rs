@@ -39,6 +39,7 @@ struct Of {
     strain: f64,
     angle_deg: Option<f64>,
     grip_mm: f64,
+    tolerance: Option<f64>,
     sed: Option<Sed>,
 }
 
@@ -58,6 +59,7 @@ impl Of {
             strain: key.strain,
             angle_deg: key.angle_deg,
             grip_mm: key.grip_mm,
+            tolerance: key.tolerance,
             sed: key.sed,
         }
     }

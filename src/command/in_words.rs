@@ -3,6 +3,7 @@
 use crate::report::cells::with_error;
 use crate::result::answer::AnswerLine;
 use crate::result::cautions::WARNING;
+use crate::result::details::Details;
 use crate::result::notes;
 use crate::result::row::{FailureLoad, Row};
 use crate::result::settings::BoundaryRule;
@@ -42,7 +43,7 @@ fn answered(row: &Row) -> String {
             format!("{load} force {force:.3} N, stiffness {k:.3} N/mm{error}")
         }
         (None, Some((force, k))) => {
-            format!("E_app {}  K {k:.6} N/mm, F {force:.6} N", modulus(row))
+            format!("E_app {}  K {k:.3} N/mm, F {force:.3} N", modulus(row))
         }
         _ => format!("E_app {}", modulus(row)),
     }
@@ -58,6 +59,22 @@ fn failure(failure: &FailureLoad) -> String {
         (None, Some(moment)) => format!("  failure moment {moment:.3} N mm"),
         (None, None) => String::new(),
     }
+}
+
+/// What each tissue carries at both ends and in the middle, in a line; None where it was not asked for or there is one tissue.
+pub fn sections_in_words(details: &Details) -> Option<String> {
+    let of = |section: &str| {
+        let own = details.sections.iter().filter(|s| s.section == section);
+        let tissues = own.filter(|s| s.label != "all");
+        let shares = tissues.map(|s| format!("label {} {:.1} %", s.label, 100.0 * s.share));
+        let shares: Vec<String> = shares.collect();
+        (!shares.is_empty()).then(|| format!("{section} {}", shares.join(", ")))
+    };
+    let found: Vec<String> = ["lower", "middle", "upper"]
+        .into_iter()
+        .filter_map(of)
+        .collect();
+    (!found.is_empty()).then(|| format!("  load carried: {}", found.join("; ")))
 }
 
 /// The modulus, with everything that is stated of it and of what that is made.

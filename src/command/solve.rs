@@ -1,7 +1,7 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
 use crate::command::fields::Fields;
-use crate::command::in_words::in_words;
+use crate::command::in_words::{in_words, sections_in_words};
 use crate::command::lattice::binned;
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
@@ -173,6 +173,9 @@ impl OpenScan {
             mark(&mut row, self.morphometry.as_ref());
             cautions::mark(&mut row, height_mm);
             session.result(format!("{}{}", in_words(&row), said_of_kept(is_kept)));
+            if let Some(line) = sections_in_words(&details) {
+                session.result(line);
+            }
             // The row first: fields that cannot be written do not cost it.
             if !is_kept {
                 self.results.store(blank, params, &row, details)?;

@@ -9,6 +9,7 @@ use crate::measure::apparent::Loaded;
 use crate::operator::held::Held;
 use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::motion::EndMotion;
+use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use crate::pipeline::apparent::voxel_fe::supports;
@@ -47,6 +48,13 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
             "use --load uniaxial, confined, or another single load",
         );
     }
+    // The elements of the solve, where they are of another mask than the scan's.
+    let resolved = resolution::resolved(specimen, params)?;
+    let own = resolution::one_element_a_voxel(params);
+    let (specimen, params) = match &resolved {
+        Some(resolved) => (resolved, &own),
+        None => (specimen, params),
+    };
     let tissue = &Tissue::of(specimen, params)?;
     let prepared = Prepared { specimen, tissue };
     let model = Bricks::new(prepared, params, Keep::BetweenGrips)?;

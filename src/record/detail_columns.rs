@@ -1,15 +1,15 @@
 //! Owns the data dictionary of the tidy tables beside `results.csv`.
 
-use crate::record::columns::{
+use crate::record::column::{
     ANGLE, AXIS, BOUNDARY, Column, ENDS, FAILURE_DISPLACEMENT, FAILURE_FACTOR, FAILURE_LOAD,
     FAILURE_MOMENT, FAILURE_STRAIN, File, GRIP, LOAD, LP, METHOD, POISSON, SCAN, SED, STRAIN,
-    STRUCTURE, YOUNG, column,
+    STRUCTURE, TOLERANCE, YOUNG, column,
 };
 
 /// Columns that say which solve a line is of.
-const OF: [Column; 14] = [
+const OF: [Column; 15] = [
     SCAN, METHOD, STRUCTURE, BOUNDARY, LP, YOUNG, POISSON, LOAD, ENDS, AXIS, STRAIN, ANGLE, GRIP,
-    SED,
+    TOLERANCE, SED,
 ];
 
 /// Those, and `own`. `N` is the number of both.
@@ -29,8 +29,8 @@ const fn with<const N: usize>(own: &[Column]) -> [Column; N] {
 
 pub const REACTIONS: File = File {
     name: "reactions.csv",
-    about: "forces and moments that the supports put on both ends, one line an end; signed, along the specimen's axes",
-    columns: &with::<24>(&[
+    about: "forces and moments that the supports put on both ends, one line an end; signed, along the specimen's axes; off to first order in the solver's error, so solve with --tolerance 1e-8 where they must balance",
+    columns: &with::<25>(&[
         column("end", "", "lower or upper, along the long axis"),
         column("force_x_n", "N", "of the supports on the end"),
         column("force_y_n", "N", "the same along y"),
@@ -62,7 +62,7 @@ const ELEMENTS: Column = column("elements", "", "how many elements");
 pub const FAILURE: File = File {
     name: "failure.csv",
     about: "failure by Pistoia's criterion at several critical volumes, where --failure asks for it",
-    columns: &with::<24>(&[
+    columns: &with::<25>(&[
         column(
             "critical_volume",
             "",
@@ -95,7 +95,7 @@ pub const FAILURE: File = File {
 pub const SECTIONS: File = File {
     name: "sections.csv",
     about: "what each tissue carries through a layer of elements at both ends and in the middle, where --statistics asks for it",
-    columns: &with::<20>(&[
+    columns: &with::<21>(&[
         column("section", "", "lower, middle, upper"),
         LABEL,
         ELEMENTS,
@@ -116,7 +116,7 @@ pub const SECTIONS: File = File {
 pub const TISSUE: File = File {
     name: "tissue.csv",
     about: "how strains and stresses are distributed over the elements of each tissue, where --statistics asks for it",
-    columns: &with::<28>(&[
+    columns: &with::<29>(&[
         LABEL,
         column(
             "quantity",

@@ -39,6 +39,7 @@ struct Of {
     strain: f64,
     angle_deg: Option<f64>,
     grip_mm: f64,
+    tolerance: Option<f64>,
     sed: Option<Sed>,
 }
 
@@ -58,6 +59,7 @@ impl Of {
             strain: key.strain,
             angle_deg: key.angle_deg,
             grip_mm: key.grip_mm,
+            tolerance: key.tolerance,
             sed: key.sed,
         }
     }
@@ -75,6 +77,13 @@ pub fn write<'a>(
     table_of::<FailureAt>(&dir.join(FAILURE), rows.clone(), |d| &d.failure)?;
     table_of::<SectionShare>(&dir.join(SECTIONS), rows.clone(), |d| &d.sections)?;
     table_of::<TissueSpread>(&dir.join(TISSUE), rows, |d| &d.tissue)
+}
+
+/// Removes the tables in `dir`, whose rows are set aside.
+pub fn remove(dir: &Path) {
+    for table in [REACTIONS, FAILURE, SECTIONS, TISSUE] {
+        let _ = std::fs::remove_file(dir.join(table));
+    }
 }
 
 fn table_of<'a, T: Clone + Default + Serialize + 'a>(

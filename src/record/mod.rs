@@ -2,6 +2,7 @@
 
 pub mod answer;
 pub mod collect_rows;
+pub mod column;
 pub mod columns;
 pub mod detail_columns;
 pub mod details;

@@ -95,7 +95,8 @@ MOVED = [
 MIXED = [
     ["--material", "labels:1=800/0.3,2=2500/0.2"],
     ["--material", "linear:300,500", "--axis", "y", "--ends", "bonded"],
-    ["--coarsen", "2", "--bins", "1000"],
+    ["--coarsen", "2"],
+    ["--coarsen", "2", "--coarsen-by", "fraction", "--bins", "1000"],
 ]
 STACK = pathlib.Path(os.environ.get("BONEPD_STACK", ROOT.parent / "shared/data/lhdl_3155_D_4_bc"))
 CROP = ["--spacing", "0.0195", "--gaussian", "1", "--lower", "63", "--crop", "60:96,60:96,80:116"]

@@ -1,6 +1,6 @@
 //! Owns what the columns of the report's tables of groups and of stiffness mean.
 
-use super::{Column, GROUP, SCAN, SUBJECT, column};
+use crate::record::column::{Column, GROUP, SCAN, SUBJECT, column};
 
 const QUANTITY: Column = column(
     "quantity",

@@ -1,6 +1,6 @@
 //! Owns what the columns of the tables that compare methods mean.
 
-use super::{BV_TV, Column, SCAN, YOUNG, column};
+use crate::record::column::{BV_TV, Column, SCAN, YOUNG, column};
 
 pub const E_APP: [Column; 21] = [
     SCAN,

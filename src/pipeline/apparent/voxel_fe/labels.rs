@@ -11,7 +11,7 @@ const MOST: usize = 64;
 /// Labels of a scan's bone.
 pub struct Labels {
     /// Those that occur, rising.
-    pub values: Vec<i32>,
+    values: Vec<i32>,
     /// By voxel of the scan.
     of: Vec<i32>,
 }
@@ -36,6 +36,14 @@ impl Labels {
             }
         }
         Ok(labels)
+    }
+
+    /// Those that tables tell apart: none where all bone has one.
+    pub fn several(&self) -> &[i32] {
+        match self.values.len() {
+            1 => &[],
+            _ => &self.values,
+        }
     }
 
     /// That of a voxel.

@@ -132,17 +132,18 @@ impl<'a> Recorder<'a> {
             return Details::default();
         }
         let deformed = self.deformed();
-        let known = self.model.labels.as_ref().map_or(&[][..], |l| &l.values);
-        let name = |e: usize| {
-            self.label(e)
-                .map_or(ALL.to_owned(), |label| label.to_string())
+        let labels = self.model.labels.as_ref();
+        let several = labels.map_or(&[][..], |labels| labels.several());
+        let name = |e: usize| match self.label(e).filter(|_| !several.is_empty()) {
+            Some(label) => label.to_string(),
+            None => ALL.to_owned(),
         };
         Details {
             sections: sections(&deformed, self.model.grips, &self.model.motion, &name),
             tissue: tissue_spread::spread(
                 &deformed,
                 self.params.sed,
-                known,
+                several,
                 &|e| self.label(e),
                 &|e| self.fraction(e),
             ),

@@ -32,6 +32,11 @@ pub trait Coarsen: Operator<3> {
         hinges.fill(false);
     }
 
+    /// Sites per task: products with fewer rows at a time may cost more a row.
+    fn chunk(&self) -> usize {
+        CHUNK
+    }
+
     /// `y[i − sites.start] = (A x)_i` for `i` in `sites`.
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]);
 
@@ -60,6 +65,10 @@ impl<O: Coarsen> Coarsen for &O {
         (**self).hinges(sites, hinges);
     }
 
+    fn chunk(&self) -> usize {
+        (**self).chunk()
+    }
+
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         (**self).rows_f64(sites, x, y);
     }
@@ -81,7 +90,7 @@ impl<O: Coarsen> MixedPrecision for O {
         y: &mut [[f32; 3]],
         finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
     ) -> f64 {
-        let [sum] = each_chunk(y, CHUNK, |first, y| {
+        let [sum] = each_chunk(y, self.chunk(), |first, y| {
             self.rows_f32(first..first + y.len(), x, y);
             [finish(first, y)]
         });
@@ -94,7 +103,7 @@ impl<O: Coarsen> MixedPrecision for O {
         out: &mut [[f32; 3]],
         consume: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        each_chunk(out, CHUNK, |first, out| {
+        each_chunk(out, self.chunk(), |first, out| {
             let mut image = vec![[0.0; 3]; out.len()];
             self.rows_f64(first..first + out.len(), x, &mut image);
             consume(first, &image, out)

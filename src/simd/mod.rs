@@ -3,8 +3,6 @@
 
 pub mod vec3;
 
-use std::ops::Sub;
-
 /// The instruction set in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Isa {
@@ -29,37 +27,25 @@ pub fn isa() -> Isa {
     Isa::Portable
 }
 
-/// Eight lanes of one scalar type, and four more for the remainder of a nine-term row.
+/// Eight lanes of one scalar type.
 ///
 /// # Safety
 /// The methods of an implementation may be called only where its instruction set is available; pointers must be valid
 /// for the lanes that are read or written. No alignment is asked for.
 #[allow(clippy::missing_safety_doc)] // one contract for all methods, above
 pub trait Lanes: Copy {
-    type S: Copy + Default + Sub<Output = Self::S>;
-    type Four: Copy;
+    type S: Copy + Default;
     unsafe fn zero() -> Self;
-    unsafe fn zero4() -> Self::Four;
     unsafe fn splat(s: Self::S) -> Self;
     unsafe fn load(p: *const Self::S) -> Self;
-    /// The first three of four scalars over and over.
-    unsafe fn load_threes(p: *const Self::S) -> Self;
     unsafe fn store(self, p: *mut Self::S);
     /// `self + a b`.
     unsafe fn fma(self, a: Self, b: Self) -> Self;
-    unsafe fn splat4(s: Self::S) -> Self::Four;
-    /// `four + a[0..4] · (x[0] − less)`.
-    unsafe fn fma4(
-        four: Self::Four,
-        a: *const Self::S,
-        x: *const Self::S,
-        less: Self::Four,
-    ) -> Self::Four;
+    unsafe fn add(self, b: Self) -> Self;
     unsafe fn sub(self, b: Self) -> Self;
-    /// `four + s four_b`.
-    unsafe fn scale4(four: Self::Four, s: Self::S, b: Self::Four) -> Self::Four;
-    /// The sums over the lanes of `a`, `b`, `c`, plus the first three lanes of `four`.
-    unsafe fn sum3(a: Self, b: Self, c: Self, four: Self::Four) -> [Self::S; 3];
+    unsafe fn mul(self, b: Self) -> Self;
+    /// The last lane of `before`, then the first seven of these.
+    unsafe fn after(self, before: Self) -> Self;
 }
 
 macro_rules! portable {
@@ -70,14 +56,9 @@ macro_rules! portable {
 
         impl Lanes for $name {
             type S = $s;
-            type Four = [$s; 4];
             #[inline(always)]
             unsafe fn zero() -> Self {
                 $name([0.0; 8])
-            }
-            #[inline(always)]
-            unsafe fn zero4() -> [$s; 4] {
-                [0.0; 4]
             }
             #[inline(always)]
             unsafe fn splat(s: $s) -> Self {
@@ -86,10 +67,6 @@ macro_rules! portable {
             #[inline(always)]
             unsafe fn load(p: *const $s) -> Self {
                 $name(unsafe { p.cast::<[$s; 8]>().read_unaligned() })
-            }
-            #[inline(always)]
-            unsafe fn load_threes(p: *const $s) -> Self {
-                $name(std::array::from_fn(|l| unsafe { *p.add(l % 3) }))
             }
             #[inline(always)]
             unsafe fn store(self, p: *mut $s) {
@@ -103,6 +80,13 @@ macro_rules! portable {
                 self
             }
             #[inline(always)]
+            unsafe fn add(mut self, b: Self) -> Self {
+                for l in 0..8 {
+                    self.0[l] += b.0[l];
+                }
+                self
+            }
+            #[inline(always)]
             unsafe fn sub(mut self, b: Self) -> Self {
                 for l in 0..8 {
                     self.0[l] -= b.0[l];
@@ -110,34 +94,18 @@ macro_rules! portable {
                 self
             }
             #[inline(always)]
-            unsafe fn splat4(s: $s) -> [$s; 4] {
-                [s; 4]
-            }
-            #[inline(always)]
-            unsafe fn fma4(
-                mut four: [$s; 4],
-                a: *const $s,
-                x: *const $s,
-                less: [$s; 4],
-            ) -> [$s; 4] {
-                let (a, x) = unsafe { (a.cast::<[$s; 4]>().read_unaligned(), *x) };
-                for l in 0..4 {
-                    four[l] += a[l] * (x - less[l]);
+            unsafe fn mul(mut self, b: Self) -> Self {
+                for l in 0..8 {
+                    self.0[l] *= b.0[l];
                 }
-                four
+                self
             }
             #[inline(always)]
-            unsafe fn scale4(mut four: [$s; 4], s: $s, b: [$s; 4]) -> [$s; 4] {
-                for l in 0..4 {
-                    four[l] += s * b[l];
-                }
-                four
-            }
-            #[inline(always)]
-            unsafe fn sum3(a: Self, b: Self, c: Self, four: [$s; 4]) -> [$s; 3] {
-                let sum =
-                    |v: [$s; 8]| ((v[0] + v[4]) + (v[1] + v[5])) + ((v[2] + v[6]) + (v[3] + v[7]));
-                [sum(a.0) + four[0], sum(b.0) + four[1], sum(c.0) + four[2]]
+            unsafe fn after(self, before: Self) -> Self {
+                $name(std::array::from_fn(|l| match l {
+                    0 => before.0[7],
+                    _ => self.0[l - 1],
+                }))
             }
         }
     };

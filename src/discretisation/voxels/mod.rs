@@ -195,6 +195,42 @@ impl VoxelMesh {
         low..high.min(self.len())
     }
 
+    /// Numbers from the first to the last corner of all bricks that have a corner among these nodes or, of those, their corner of
+    /// smallest x, y, z before the last of them. Need not be tight.
+    pub fn corners(&self, nodes: Range<usize>) -> Range<usize> {
+        let numbered = PADDING as usize..self.len() - PADDING as usize;
+        let (first, last) = (nodes.start.max(numbered.start), nodes.end.min(numbered.end));
+        if first >= last {
+            return nodes;
+        }
+        let from = |node: usize, d: i64| {
+            let [x, y, z] = self.indices(node).map(i64::from);
+            self.first_from([z + d, y + d, x + d])
+        };
+        let (low, high) = (from(first, -1), from(last - 1, 1));
+        low.min(nodes.start)..(high + 1).max(nodes.end).min(self.len())
+    }
+
+    /// The first node at or after z, y, x, in the order of the nodes.
+    fn first_from(&self, [z, y, x]: [i64; 3]) -> usize {
+        let segments = &self.segments[1..self.segments.len() - 1];
+        let end = |s: &Segment| {
+            let [sx, sy, sz] = s.at.map(i64::from);
+            [sz, sy, sx + i64::from(s.len)]
+        };
+        let next = segments.partition_point(|s| end(s) <= [z, y, x]);
+        let Some(s) = segments.get(next) else {
+            return self.len() - PADDING as usize;
+        };
+        let [sx, sy, sz] = s.at.map(i64::from);
+        let skip = if [sz, sy] == [z, y] {
+            (x - sx).max(0)
+        } else {
+            0
+        };
+        s.start as usize + skip as usize
+    }
+
     /// Node indices (0 to n along each axis) of a node.
     pub fn indices(&self, node: usize) -> [u32; 3] {
         let i = self.segments.partition_point(|s| s.nodes().end <= node);

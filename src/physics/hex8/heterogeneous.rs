@@ -1,13 +1,13 @@
 //! Owns voxel finite elements whose moduli differ: each brick's stiffness times a factor of its own and, where Poisson's
-//! ratios differ, too, one table of stencils per ratio.
+//! ratios differ, too, one set of coefficients per ratio.
 
 use super::element::{self, Integration};
 use super::kernel::{self, Elements};
+use super::modes::Modal;
 use super::stencils::{Couplings, Stencils};
 use crate::discretisation::voxels::VoxelMesh;
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
-use crate::par;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -18,8 +18,8 @@ const STIFF: f32 = 0.05;
 pub struct Heterogeneous {
     mesh: VoxelMesh,
     /// By kind of element.
-    double: Vec<Stencils<f64>>,
-    single: Vec<Stencils<f32>>,
+    modal: Vec<Modal<f64>>,
+    stencils: Vec<Stencils>,
     couplings: Vec<Couplings>,
     /// Of the elements one by one, so of all together.
     eigenvalue_bound: f64,
@@ -65,16 +65,16 @@ impl Heterogeneous {
             .iter()
             .map(|&(nu, rule)| element::stiffness(h, young_mpa, nu, rule))
             .collect();
-        let double: Vec<_> = matrices.iter().map(Stencils::new).collect();
+        let stencils: Vec<_> = matrices.iter().map(Stencils::new).collect();
         Heterogeneous {
-            single: double.iter().map(Stencils::to_f32).collect(),
-            couplings: double.iter().map(Couplings::new).collect(),
+            modal: matrices.iter().map(Modal::new).collect(),
+            couplings: stencils.iter().map(Couplings::new).collect(),
             eigenvalue_bound: matrices
                 .iter()
                 .map(element::eigenvalue_bound)
                 .fold(0.0, f64::max),
             mesh,
-            double,
+            stencils,
             factor,
             kind,
         }
@@ -90,16 +90,48 @@ impl Heterogeneous {
         (self.factor[node], kind)
     }
 
-    fn elements(&self) -> Elements<'_> {
+    fn elements<'a, S>(&'a self, modal: &'a [Modal<[S; 8]>]) -> Elements<'a, S> {
         Elements {
             mesh: &self.mesh,
+            modal,
             factor: &self.factor,
             kind: &self.kind,
         }
     }
 }
 
+/// The node that is the corner of smallest x, y, z of element `e` around node `i` of a segment.
+#[inline(always)]
+fn low_corner(rows: &[u32; 9], i: usize, e: usize) -> usize {
+    let (x, y, z) = (e & 1, e >> 1 & 1, e >> 2);
+    rows[y + 3 * z] as usize + i + x - 1
+}
+
 impl Heterogeneous {
+    /// Factor and kind of all elements `around` node `i` of a segment, if they are alike. There is one at least.
+    #[inline(always)]
+    fn alike(&self, around: u8, rows: &[u32; 9], i: usize) -> Option<(f32, usize)> {
+        let lowest = around.trailing_zeros() as usize & 7;
+        let first = self.of(low_corner(rows, i, lowest));
+        let mut alike = true;
+        for e in 0..8 {
+            // Where there is no element, the first one again: no branch.
+            let there = around >> e & 1 == 1;
+            let e = if there { e } else { lowest };
+            alike &= self.of(low_corner(rows, i, e)) == first;
+        }
+        alike.then_some(first)
+    }
+
+    #[inline(always)]
+    fn of(&self, low: usize) -> (f32, usize) {
+        let kind = match self.kind.is_empty() {
+            true => 0,
+            false => usize::from(self.kind[low]),
+        };
+        (self.factor[low], kind)
+    }
+
     /// The elements around node `i` of a segment: the bit of each, its factor and kind.
     fn around<'a>(
         &'a self,
@@ -109,7 +141,7 @@ impl Heterogeneous {
     ) -> impl Iterator<Item = (u8, f32, usize)> + 'a {
         let there = (0..8).filter(move |e| around >> e & 1 == 1);
         there.map(move |e| {
-            let (factor, kind) = self.elements().of(kernel::low_corner(rows, i, e));
+            let (factor, kind) = self.of(low_corner(rows, i, e));
             (1 << e, factor, kind)
         })
     }
@@ -144,21 +176,23 @@ impl Operator<3> for Heterogeneous {
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        y.par_chunks_mut(par::CHUNK).enumerate().for_each(|(c, y)| {
-            self.rows_f64(c * par::CHUNK..c * par::CHUNK + y.len(), x, y);
+        let chunk = self.chunk();
+        y.par_chunks_mut(chunk).enumerate().for_each(|(c, y)| {
+            self.rows_f64(c * chunk..c * chunk + y.len(), x, y);
         });
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
-        d.par_chunks_mut(par::CHUNK).enumerate().for_each(|(c, d)| {
-            let sites = c * par::CHUNK..c * par::CHUNK + d.len();
+        let chunk = self.chunk();
+        d.par_chunks_mut(chunk).enumerate().for_each(|(c, d)| {
+            let sites = c * chunk..c * chunk + d.len();
             for segment in self.mesh.segments_in(sites.clone()) {
                 for (i, node) in segment.nodes().enumerate() {
                     let d = &mut d[node - sites.start];
                     *d = [0.0; 3];
                     let around = self.mesh.around[node];
                     for (bit, factor, kind) in self.around(around, &segment.rows, i) {
-                        let one = self.double[kind].diagonal(bit);
+                        let one = self.stencils[kind].diagonal(bit);
                         (0..3).for_each(|a| d[a] += f64::from(factor) * one[a]);
                     }
                 }
@@ -181,7 +215,7 @@ impl Coarsen for Heterogeneous {
                     visit(node, &[], &[]);
                     continue;
                 }
-                let alike = self.elements().alike(around, &segment.rows, i as usize);
+                let alike = self.alike(around, &segment.rows, i as usize);
                 let (places, whole) = self.couplings[0].of(around);
                 columns.clear();
                 columns.extend(
@@ -221,12 +255,19 @@ impl Coarsen for Heterogeneous {
         }
     }
 
+    fn chunk(&self) -> usize {
+        kernel::chunk(&self.mesh)
+    }
+
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        kernel::heterogeneous_f64(&self.double, self.elements(), sites, x, y);
+        let modal: Vec<_> = self.modal.iter().map(kernel::wide).collect();
+        kernel::rows(self.elements(&modal), sites, x, y);
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
-        kernel::heterogeneous_f32(&self.single, self.elements(), sites, x, y);
+        let single = |m: &Modal<f64>| kernel::wide(&m.map(|v| v as f32));
+        let modal: Vec<_> = self.modal.iter().map(single).collect();
+        kernel::rows(self.elements(&modal), sites, x, y);
     }
 
     fn eigenvalue_bound(&self) -> f64 {

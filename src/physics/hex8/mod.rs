@@ -7,13 +7,15 @@ pub mod element;
 pub mod fields;
 pub mod heterogeneous;
 mod kernel;
+mod modes;
 mod stencils;
 
 use crate::discretisation::voxels::VoxelMesh;
 use crate::operator::Operator;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
-use crate::par;
 use element::{ElementMatrix, Integration};
+use kernel::Elements;
+use modes::Modal;
 use rayon::prelude::*;
 use std::ops::Range;
 use stencils::{Couplings, Stencils};
@@ -21,8 +23,8 @@ use stencils::{Couplings, Stencils};
 /// `A u` is the vector of nodal forces (N) of the displacements `u` (mm), without any support.
 pub struct Hex8 {
     pub mesh: VoxelMesh,
-    double: Stencils<f64>,
-    single: Stencils<f32>,
+    modal: Modal<f64>,
+    stencils: Stencils,
     couplings: Couplings,
     /// Of one element, so of all together.
     eigenvalue_bound: f64,
@@ -37,13 +39,22 @@ impl Hex8 {
 
     /// Elements that all have the stiffness matrix `k`, in N/mm.
     pub fn of_matrix(mesh: VoxelMesh, k: &ElementMatrix) -> Self {
-        let double = Stencils::new(k);
+        let stencils = Stencils::new(k);
         Hex8 {
             mesh,
-            single: double.to_f32(),
-            couplings: Couplings::new(&double),
+            modal: Modal::new(k),
+            couplings: Couplings::new(&stencils),
             eigenvalue_bound: element::eigenvalue_bound(k),
-            double,
+            stencils,
+        }
+    }
+
+    fn elements<'a, S>(&'a self, modal: &'a [Modal<[S; 8]>]) -> Elements<'a, S> {
+        Elements {
+            mesh: &self.mesh,
+            modal,
+            factor: &[],
+            kind: &[],
         }
     }
 }
@@ -54,16 +65,16 @@ impl Operator<3> for Hex8 {
     }
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        y.par_chunks_mut(par::CHUNK).enumerate().for_each(|(c, y)| {
-            let start = c * par::CHUNK;
-            self.rows_f64(start..start + y.len(), x, y);
+        let chunk = self.chunk();
+        y.par_chunks_mut(chunk).enumerate().for_each(|(c, y)| {
+            self.rows_f64(c * chunk..c * chunk + y.len(), x, y);
         });
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
         d.par_iter_mut()
             .zip(&self.mesh.around)
-            .for_each(|(d, &around)| *d = self.double.diagonal(around));
+            .for_each(|(d, &around)| *d = self.stencils.diagonal(around));
     }
 }
 
@@ -98,12 +109,18 @@ impl Coarsen for Hex8 {
         pairs.for_each(|(hinge, &around)| *hinge = !share_faces(around));
     }
 
+    fn chunk(&self) -> usize {
+        kernel::chunk(&self.mesh)
+    }
+
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        kernel::rows_f64(&self.mesh, &self.double, sites, x, y);
+        let modal = [kernel::wide(&self.modal)];
+        kernel::rows(self.elements(&modal), sites, x, y);
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
-        kernel::rows_f32(&self.mesh, &self.single, sites, x, y);
+        let modal = [kernel::wide(&self.modal.map(|v| v as f32))];
+        kernel::rows(self.elements(&modal), sites, x, y);
     }
 
     fn eigenvalue_bound(&self) -> f64 {
@@ -183,15 +200,17 @@ mod tests {
             let x = vector(op.sites());
             let exact = by_elements(&op.mesh, &x, |_| 1.0);
             let scale = exact.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+            let double = [kernel::wide(&op.modal)];
+            let single = [kernel::wide(&op.modal.map(|v| v as f32))];
             kernel::each_way_f64(|way, rows| {
                 let mut y = vec![[0.0; 3]; x.len()];
-                rows(&op.mesh, &op.double, 0..x.len(), &x, &mut y);
+                rows(op.elements(&double), 0..x.len(), &x, &mut y);
                 assert!(worst(&exact, &y) < 1e-13 * scale, "{way}, {percent} %");
             });
             let x32: Vec<[f32; 3]> = x.iter().map(|v| v.map(|c| c as f32)).collect();
             kernel::each_way_f32(|way, rows| {
                 let mut y32 = vec![[0.0; 3]; x.len()];
-                rows(&op.mesh, &op.single, 0..x.len(), &x32, &mut y32);
+                rows(op.elements(&single), 0..x.len(), &x32, &mut y32);
                 let y: Vec<[f64; 3]> = y32.iter().map(|v| v.map(f64::from)).collect();
                 // Measured 4e-7.
                 assert!(worst(&exact, &y) < 3e-6 * scale, "{way}, {percent} %");

@@ -1,73 +1,34 @@
 //! Owns the rows of the operator: for each of the 256 ways in which the elements around a node can exist, the 27
-//! blocks that couple it to its neighbours, laid out for eight lanes.
+//! blocks that couple it to its neighbours.
 
 use super::element::ElementMatrix;
 use crate::operator::coarsen::Block;
 
-/// Scalars per stencil. Nine rows of neighbours (dy fastest, then dz), each three components of the force times the
-/// first eight of nine displacements (dx slowest, then component): 216. Then per row the ninth displacement's
-/// column of three, padded to four: 36. Padded to a whole number of cache lines.
-pub const STRIDE: usize = 256;
-/// Where the ninth columns begin.
-pub const NINTH: usize = 216;
-
-/// One stencil, on cache lines of its own: registers are read whole from one line.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-struct Aligned<S>([S; STRIDE]);
-
-/// All 256 stencils.
+/// All 256: the blocks of nine rows of neighbours (dx fastest, then dy, then dz).
 #[derive(Debug, Clone)]
-pub struct Stencils<S> {
-    table: Vec<Aligned<S>>,
+pub struct Stencils {
+    table: Vec<[[[f64; 3]; 3]; 27]>,
 }
 
-impl<S: Copy> Stencils<S> {
-    #[inline(always)]
-    pub fn stencil(&self, around: u8) -> &[S; STRIDE] {
-        &self.table[around as usize].0
-    }
-}
-
-impl Stencils<f64> {
+impl Stencils {
     pub fn new(k: &ElementMatrix) -> Self {
-        let mut table = vec![Aligned([0.0; STRIDE]); 256];
+        let mut table = vec![[[[0.0; 3]; 3]; 27]; 256];
         for (around, stencil) in table.iter_mut().enumerate() {
             for element in (0..8).filter(|e| around >> e & 1 == 1) {
-                add_element(&mut stencil.0, element, k);
+                add_element(stencil, element, k);
             }
         }
         Stencils { table }
     }
 
-    /// What rounding left where elements' contributions cancel becomes zero: products with it would fall below what single
-    /// precision holds in full, and such take a hundred times as long.
-    pub fn to_f32(&self) -> Stencils<f32> {
-        let all = self.table.iter().flat_map(|stencil| stencil.0);
-        let largest = all.fold(0.0, |m: f64, v| m.max(v.abs()));
-        let single = |v: f64| match v.abs() > 1e-12 * largest {
-            true => v as f32,
-            false => 0.0,
-        };
-        Stencils {
-            table: self
-                .table
-                .iter()
-                .map(|s| Aligned(s.0.map(single)))
-                .collect(),
-        }
-    }
-
-    /// The block that couples a node to its neighbour at `dx` (0, 1 or 2) in a row of neighbours.
-    fn block(&self, around: u8, row: usize, dx: usize) -> Block {
-        let stencil = self.stencil(around);
-        std::array::from_fn(|a| std::array::from_fn(|b| stencil[slot(row, a, 3 * dx + b)] as f32))
+    fn block(&self, around: u8, neighbour: usize) -> Block {
+        self.table[around as usize][neighbour].map(|row| row.map(|v| v as f32))
     }
 
     /// The diagonal of the node's own block.
     pub fn diagonal(&self, around: u8) -> [f64; 3] {
-        let stencil = self.stencil(around);
-        std::array::from_fn(|a| stencil[slot(4, a, 3 + a)])
+        let own = &self.table[around as usize][13];
+        std::array::from_fn(|a| own[a][a])
     }
 }
 
@@ -94,7 +55,7 @@ impl Place {
 }
 
 impl Couplings {
-    pub fn new(stencils: &Stencils<f64>) -> Self {
+    pub fn new(stencils: &Stencils) -> Self {
         let (mut starts, mut places, mut blocks) = (vec![0], Vec::new(), Vec::new());
         for around in 0..=255u8 {
             for i in 0..27usize {
@@ -104,7 +65,7 @@ impl Couplings {
                         row: row as u8,
                         dx: dx as u8,
                     });
-                    blocks.push(stencils.block(around, row, dx));
+                    blocks.push(stencils.block(around, i));
                 }
             }
             starts.push(places.len() as u32);
@@ -131,23 +92,15 @@ fn shares_element(around: u8, d: [usize; 3]) -> bool {
     })
 }
 
-/// Place of the coefficient of displacement `column` (3 dx + component) of a row in force component `a`.
-fn slot(row: usize, a: usize, column: usize) -> usize {
-    if column < 8 {
-        row * 24 + a * 8 + column
-    } else {
-        NINTH + 4 * row + a
-    }
-}
-
-fn add_element(stencil: &mut [f64], element: usize, k: &ElementMatrix) {
+fn add_element(stencil: &mut [[[f64; 3]; 3]; 27], element: usize, k: &ElementMatrix) {
     let upper: [usize; 3] = std::array::from_fn(|a| element >> a & 1);
     let own = (0..3).map(|a| (1 - upper[a]) << a).sum::<usize>();
     for corner in 0..8usize {
         let d: [usize; 3] = std::array::from_fn(|a| upper[a] + (corner >> a & 1));
+        let block = &mut stencil[d[0] + 3 * d[1] + 9 * d[2]];
         for a in 0..3 {
             for b in 0..3 {
-                stencil[slot(d[1] + 3 * d[2], a, 3 * d[0] + b)] += k[3 * own + a][3 * corner + b];
+                block[a][b] += k[3 * own + a][3 * corner + b];
             }
         }
     }

@@ -9,15 +9,15 @@ use std::ops::Range;
 /// No aggregate: padding, or a site with nothing free.
 pub const NONE: u32 = u32::MAX;
 
-/// Sites per chunk.
-pub const CHUNK: usize = 2048;
-
 const NOWHERE: u16 = u16::MAX;
 
 /// Sites by aggregate.
 #[derive(Debug, Clone)]
 pub struct Aggregates {
     pub count: usize,
+    /// Sites per chunk, a power of two, and chunks per task.
+    chunk: usize,
+    together: usize,
     /// Per site the place of its aggregate in its chunk's list, or [`NOWHERE`].
     places: Vec<u16>,
     /// Aggregates of the chunks, list after list.
@@ -29,27 +29,38 @@ pub struct Aggregates {
     entry_starts: Vec<u32>,
 }
 
-/// The sums of one chunk.
+/// The sums of one task's chunks.
 pub struct Sums<'a, T> {
-    start: usize,
+    first: usize,
+    chunk: usize,
+    /// Where the sums of each chunk begin among those of all.
+    starts: &'a [u32],
     places: &'a [u16],
     sums: &'a mut [T],
 }
 
 impl<T> Sums<'_, T> {
-    /// The sum that a site of the chunk adds to; None for a site without an aggregate.
+    /// The sum that a site of the task adds to; None for a site without an aggregate.
     #[inline]
     pub fn of(&mut self, site: usize) -> Option<&mut T> {
-        self.sums.get_mut(self.places[site - self.start] as usize)
+        let i = site - self.first;
+        let start = self.starts[i >> self.chunk.trailing_zeros()] - self.starts[0];
+        match self.places[i] {
+            NOWHERE => None,
+            place => Some(&mut self.sums[start as usize + place as usize]),
+        }
     }
 }
 
 impl Aggregates {
-    /// From each site's aggregate, or [`NONE`].
-    pub fn new(of: &[u32], count: usize) -> Self {
-        let chunks: Vec<(Vec<u16>, Vec<u32>)> = of.par_chunks(CHUNK).map(places).collect();
+    /// From each site's aggregate, or [`NONE`], in chunks of that many sites, a power of two up to 2¹⁵.
+    /// Sums are made by tasks of that many sites, in whole chunks.
+    pub fn new(of: &[u32], count: usize, chunk: usize, task: usize) -> Self {
+        let chunks: Vec<(Vec<u16>, Vec<u32>)> = of.par_chunks(chunk).map(places).collect();
         let mut all = Aggregates {
             count,
+            chunk,
+            together: task.div_ceil(chunk),
             places: Vec::with_capacity(of.len()),
             lists: Vec::new(),
             starts: vec![0],
@@ -90,11 +101,14 @@ impl Aggregates {
     pub fn of(&self, site: usize) -> u32 {
         match self.places[site] {
             NOWHERE => NONE,
-            place => self.lists[self.starts[site / CHUNK] as usize + place as usize],
+            place => {
+                self.lists
+                    [self.starts[site >> self.chunk.trailing_zeros()] as usize + place as usize]
+            }
         }
     }
 
-    /// `out[a] = Σ` over the sites of aggregate `a`; `visit` adds what the sites of one chunk have.
+    /// `out[a] = Σ` over the sites of aggregate `a`; `visit` adds what the sites of one task have.
     pub fn sum<T: Copy + Send + Sync>(
         &self,
         out: &mut [T],
@@ -103,25 +117,25 @@ impl Aggregates {
         add: impl Fn(&mut T, &T) + Sync,
     ) {
         let mut parts = vec![zero; self.lists.len()];
-        let mut chunks = Vec::with_capacity(self.starts.len());
+        let mut tasks = Vec::with_capacity(self.starts.len() / self.together + 1);
         let mut rest = &mut parts[..];
-        for ends in self.starts.windows(2) {
-            let (here, others) = rest.split_at_mut((ends[1] - ends[0]) as usize);
-            chunks.push(here);
+        for first in (0..self.starts.len() - 1).step_by(self.together) {
+            let last = (first + self.together).min(self.starts.len() - 1);
+            let starts = &self.starts[first..=last];
+            let (here, others) = rest.split_at_mut((starts[starts.len() - 1] - starts[0]) as usize);
+            tasks.push((first * self.chunk, starts, here));
             rest = others;
         }
-        chunks.into_par_iter().enumerate().for_each(|(c, sums)| {
-            let start = c * CHUNK;
-            let sites = start..(start + CHUNK).min(self.places.len());
-            let places = &self.places[sites.clone()];
-            visit(
-                sites,
-                &mut Sums {
-                    start,
-                    places,
-                    sums,
-                },
-            );
+        tasks.into_par_iter().for_each(|(first, starts, sums)| {
+            let sites = first..(first + self.together * self.chunk).min(self.places.len());
+            let mut sums = Sums {
+                first,
+                chunk: self.chunk,
+                starts,
+                places: &self.places[sites.clone()],
+                sums,
+            };
+            visit(sites, &mut sums);
         });
         let sum = |(a, out): (usize, &mut T)| {
             *out = zero;
@@ -152,7 +166,7 @@ mod tests {
 
     #[test]
     fn sums_are_those_of_each_aggregates_sites() {
-        let of: Vec<u32> = (0..3 * CHUNK as u32 + 17)
+        let of: Vec<u32> = (0..3 * 1024 + 17)
             .map(|i| {
                 if i % 11 == 3 {
                     NONE
@@ -161,7 +175,7 @@ mod tests {
                 }
             })
             .collect();
-        let all = Aggregates::new(&of, 900);
+        let all = Aggregates::new(&of, 900, 1024, 2000);
         let mut expected = vec![0u64; 900];
         for (i, &a) in of.iter().enumerate() {
             assert_eq!(all.of(i), a);

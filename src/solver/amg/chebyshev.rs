@@ -3,14 +3,13 @@
 //! Every site gathers and writes only itself, so the smoother is symmetric and the same on any number of threads.
 //! Rows are made a chunk at a time and used while they are in the cache.
 
-pub use super::aggregate::CHUNK;
-use super::level::Level;
+use super::level::{Level, with_rows};
 use rayon::prelude::*;
 
 /// Coefficients of `x₊ = x + momentum (x − x₋) + step D⁻¹(b − A x)`, one pair a degree.
 #[derive(Debug, Clone)]
 pub struct Chebyshev {
-    steps: Vec<(f32, f32)>,
+    pub steps: Vec<(f32, f32)>,
 }
 
 impl Chebyshev {
@@ -38,9 +37,10 @@ impl Chebyshev {
         other: &mut Vec<[f32; D]>,
     ) {
         let step = self.steps[0].1;
-        x.par_chunks_mut(CHUNK).enumerate().for_each(|(c, x)| {
+        let chunk = level.chunk();
+        x.par_chunks_mut(chunk).enumerate().for_each(|(c, x)| {
             for (i, x) in x.iter_mut().enumerate() {
-                let site = c * CHUNK + i;
+                let site = c * chunk + i;
                 *x = level.scale(site, &b[site]).map(|v| step * v);
             }
         });
@@ -77,28 +77,29 @@ fn sweep<const D: usize>(
     momentum: f32,
     step: f32,
 ) {
+    let chunk = level.chunk();
     before
-        .par_chunks_mut(CHUNK)
+        .par_chunks_mut(chunk)
         .enumerate()
         .for_each(|(c, before)| {
-            let start = c * CHUNK;
-            let mut rows = [[0.0; D]; CHUNK];
-            let rows = &mut rows[..before.len()];
-            level.rows(start..start + before.len(), x, rows);
-            for (i, (before, row)) in before.iter_mut().zip(rows).enumerate() {
-                let site = start + i;
-                let r: [f32; D] = std::array::from_fn(|d| b[site][d] - row[d]);
-                let s = level.scale(site, &r);
-                let x = &x[site];
-                // Without momentum what was there before does not count, whatever it is.
-                for d in 0..D {
-                    let turn = if momentum == 0.0 {
-                        0.0
-                    } else {
-                        momentum * (x[d] - before[d])
-                    };
-                    before[d] = x[d] + turn + step * s[d];
+            with_rows(before.len(), |rows| {
+                let start = c * chunk;
+                level.rows(start..start + before.len(), x, rows);
+                for (i, (before, row)) in before.iter_mut().zip(rows).enumerate() {
+                    let site = start + i;
+                    let r: [f32; D] = std::array::from_fn(|d| b[site][d] - row[d]);
+                    let s = level.scale(site, &r);
+                    let x = &x[site];
+                    // Without momentum what was there before does not count, whatever it is.
+                    for d in 0..D {
+                        let turn = if momentum == 0.0 {
+                            0.0
+                        } else {
+                            momentum * (x[d] - before[d])
+                        };
+                        before[d] = x[d] + turn + step * s[d];
+                    }
                 }
-            }
+            })
         });
 }

@@ -50,7 +50,7 @@ impl Coarse {
         let level = Coarse {
             matrix,
             inverse,
-            aggregates: Aggregates::new(&of, count),
+            aggregates: Aggregates::new(&of, count, CHUNK, CHUNK),
             modes,
         };
         (level, next)
@@ -152,6 +152,9 @@ fn inverse_block(block: &Block6, mean_site_stiffness: f32) -> Block6 {
 /// eight).
 const MARGIN: f32 = 1.1;
 
+/// Steps that find it.
+const STEPS: usize = 24;
+
 fn times(block: &Block6, r: &Six) -> Six {
     let mut out = [0.0; 6];
     for c in 0..6 {
@@ -162,9 +165,16 @@ fn times(block: &Block6, r: &Six) -> Six {
     out
 }
 
+/// Sites per task: a level of a few thousand sites is shared by sixteen threads.
+const CHUNK: usize = 128;
+
 impl Level<6> for Coarse {
     fn sites(&self) -> usize {
         self.inverse.len()
+    }
+
+    fn chunk(&self) -> usize {
+        CHUNK
     }
 
     fn rows(&self, sites: Range<usize>, x: &[Six], y: &mut [Six]) {
@@ -228,6 +238,10 @@ impl Level<6> for Coarse {
     }
 
     fn eigenvalue_bound(&self) -> f32 {
-        MARGIN * eigenvalue::largest(self)
+        let scaled = |r: &[Six], z: &mut [Six]| {
+            let sites = z.par_iter_mut().with_min_len(CHUNK).zip(r).enumerate();
+            sites.for_each(|(i, (z, r))| *z = self.scale(i, r));
+        };
+        MARGIN * eigenvalue::largest(self, STEPS, scaled)
     }
 }

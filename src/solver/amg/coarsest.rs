@@ -6,7 +6,7 @@
 
 use super::blocks::BlockMatrix;
 use super::coarse::LEAST_STIFFNESS;
-use super::level::Six;
+use super::cycle::Vectors;
 
 /// Pivots below this share of the unit diagonal are rounding of the single-precision matrix.
 const LEAST_PIVOT: f64 = 2e-6;
@@ -48,7 +48,9 @@ impl Coarsest {
         }
     }
 
-    pub fn solve(&self, b: &[Six], x: &mut [Six]) {
+    /// `x` of `room` from its `b`.
+    pub fn solve(&self, room: &mut Vectors) {
+        let Vectors { b, x, .. } = room;
         let n = self.order.len();
         let b = b.as_flattened();
         let mut v: Vec<f64> = self.order[..self.rank]

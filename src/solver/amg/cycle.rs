@@ -1,9 +1,9 @@
-//! Owns the V-cycle.
+//! Owns the cycle of one level, and the polynomial of several that solves an assembled one.
 
 use super::aggregate::NONE;
 use super::aggregate::Sums;
-use super::chebyshev::{CHUNK, Chebyshev};
-use super::level::{Level, Six};
+use super::chebyshev::Chebyshev;
+use super::level::{Level, Six, with_rows};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -12,8 +12,13 @@ use std::ops::Range;
 pub struct Vectors {
     /// Right-hand side.
     pub b: Vec<Six>,
+    /// Solution.
     pub x: Vec<Six>,
-    pub spare: Vec<Six>,
+    /// The solution before, residual and result of a cycle, and its spare vector.
+    before: Vec<Six>,
+    r: Vec<Six>,
+    z: Vec<Six>,
+    spare: Vec<Six>,
 }
 
 impl Vectors {
@@ -22,9 +27,33 @@ impl Vectors {
         Vectors {
             b: zero(),
             x: zero(),
+            before: zero(),
+            r: zero(),
+            z: zero(),
             spare: zero(),
         }
     }
+}
+
+/// One cycle on an assembled level: `z ≈ A⁻¹ r`.
+pub fn one_cycle(
+    level: &impl Level<6>,
+    how: &Smoothing,
+    r: &[Six],
+    z: &mut [Six],
+    room: &mut Vectors,
+    below: &mut impl Below,
+) {
+    cycle(level, how, r, &mut room.z, &mut room.spare, below);
+    z.copy_from_slice(&room.z);
+}
+
+/// The problem below a level.
+pub trait Below {
+    /// Its right-hand side, to be filled in.
+    fn right(&mut self) -> &mut [Six];
+    /// Its solution.
+    fn solve(&mut self) -> &[Six];
 }
 
 /// How one level smooths and prolongs.
@@ -35,20 +64,61 @@ pub struct Smoothing {
     pub omega: f32,
 }
 
-/// One cycle for `A x = b` from zero. `next(collect)` solves the coarse problem, whose right-hand side `collect` makes.
-/// Beside `b` and `x` there is one vector more, `spare`.
-pub fn cycle<'e, const D: usize>(
+/// Solves `A x = b` by cycles, as many as `cycles` has degrees, put together
+/// by its Chebyshev polynomial. The polynomial is fixed, so all of it is linear and symmetric.
+pub fn accelerated(
+    level: &impl Level<6>,
+    how: &Smoothing,
+    cycles: &Chebyshev,
+    room: &mut Vectors,
+    below: &mut impl Below,
+) {
+    let Vectors {
+        b,
+        x,
+        before,
+        r,
+        z,
+        spare,
+    } = room;
+    x.fill([0.0; 6]);
+    before.fill([0.0; 6]);
+    let chunk = level.chunk();
+    for (k, &(momentum, step)) in cycles.steps.iter().enumerate() {
+        let right = if k == 0 {
+            &*b
+        } else {
+            r.par_chunks_mut(chunk).enumerate().for_each(|(c, r)| {
+                let start = c * chunk;
+                level.rows(start..start + r.len(), x, r);
+                for (r, b) in r.iter_mut().zip(&b[start..]) {
+                    *r = std::array::from_fn(|d| b[d] - r[d]);
+                }
+            });
+            &*r
+        };
+        cycle(level, how, right, z, spare, below);
+        let values = before.par_iter_mut().with_min_len(chunk).zip(&*x).zip(&*z);
+        values.for_each(|((before, x), z)| {
+            *before = std::array::from_fn(|d| x[d] + momentum * (x[d] - before[d]) + step * z[d]);
+        });
+        std::mem::swap(x, before);
+    }
+}
+
+/// One cycle for `A x = b` from zero. Beside `b` and `x` there is one vector more, `spare`.
+pub fn cycle<const D: usize>(
     level: &impl Level<D>,
     how: &Smoothing,
     b: &[[f32; D]],
     x: &mut Vec<[f32; D]>,
     spare: &mut Vec<[f32; D]>,
-    next: impl FnOnce(&mut dyn FnMut(&mut [Six])) -> &'e [Six],
+    below: &mut impl Below,
 ) {
     how.smoother.start(level, b, x, spare);
     scaled_residual(level, b, x, spare);
-    let correction = next(&mut |g| restrict(level, how.omega, b, x, spare, g));
-    spread(level, correction, spare);
+    restrict(level, how.omega, b, x, spare, below.right());
+    spread(level, below.solve(), spare);
     add_smoothed(level, how.omega, spare, x);
     how.smoother.go_on(level, b, x, spare);
 }
@@ -60,8 +130,9 @@ fn scaled_residual<const D: usize>(
     x: &[[f32; D]],
     t: &mut [[f32; D]],
 ) {
-    t.par_chunks_mut(CHUNK).enumerate().for_each(|(c, t)| {
-        let start = c * CHUNK;
+    let chunk = level.chunk();
+    t.par_chunks_mut(chunk).enumerate().for_each(|(c, t)| {
+        let start = c * chunk;
         level.rows(start..start + t.len(), x, t);
         for (site, t) in (start..).zip(t) {
             let s: [f32; D] = std::array::from_fn(|d| b[site][d] - t[d]);
@@ -82,26 +153,26 @@ fn restrict<const D: usize>(
 ) {
     let visit = |sites: Range<usize>, sums: &mut Sums<[f32; 8]>| {
         let start = sites.start;
-        let mut image = [[0.0; D]; CHUNK];
-        let image = &mut image[..sites.len()];
-        level.rows(sites.clone(), t, image);
-        let mut again = Vec::new();
-        if level.unscale(start, &t[start]).is_none() {
-            again.resize(sites.len(), [0.0; D]);
-            level.rows(sites.clone(), x, &mut again);
-        }
-        level.each_modes(sites, |site, modes| {
-            let Some(sum) = sums.of(site) else { return };
-            let i = site - start;
-            let s = level
-                .unscale(site, &t[site])
-                .unwrap_or_else(|| std::array::from_fn(|d| b[site][d] - again[i][d]));
-            for d in 0..D {
-                let v = s[d] - omega * image[i][d];
-                for (sum, mode) in sum.iter_mut().zip(&modes[d]) {
-                    *sum += mode * v;
-                }
+        with_rows(sites.len(), |image| {
+            level.rows(sites.clone(), t, image);
+            let mut again = Vec::new();
+            if level.unscale(start, &t[start]).is_none() {
+                again.resize(sites.len(), [0.0; D]);
+                level.rows(sites.clone(), x, &mut again);
             }
+            level.each_modes(sites, |site, modes| {
+                let Some(sum) = sums.of(site) else { return };
+                let i = site - start;
+                let s = level
+                    .unscale(site, &t[site])
+                    .unwrap_or_else(|| std::array::from_fn(|d| b[site][d] - again[i][d]));
+                for d in 0..D {
+                    let v = s[d] - omega * image[i][d];
+                    for (sum, mode) in sum.iter_mut().zip(&modes[d]) {
+                        *sum += mode * v;
+                    }
+                }
+            });
         });
     };
     let add = |sum: &mut [f32; 8], part: &[f32; 8]| {
@@ -121,25 +192,27 @@ fn add_smoothed<const D: usize>(
     v: &[[f32; D]],
     x: &mut [[f32; D]],
 ) {
-    x.par_chunks_mut(CHUNK).enumerate().for_each(|(c, x)| {
-        let start = c * CHUNK;
-        let mut rows = [[0.0; D]; CHUNK];
-        let rows = &mut rows[..x.len()];
-        level.rows(start..start + x.len(), v, rows);
-        for (i, (x, row)) in x.iter_mut().zip(rows).enumerate() {
-            let scaled = level.scale(start + i, row);
-            for d in 0..D {
-                x[d] += v[start + i][d] - omega * scaled[d];
+    let chunk = level.chunk();
+    let chunks = x.par_chunks_mut(chunk).enumerate();
+    chunks.for_each(|(c, x)| {
+        with_rows(x.len(), |rows| {
+            let start = c * chunk;
+            level.rows(start..start + x.len(), v, rows);
+            for (i, (x, row)) in x.iter_mut().zip(rows).enumerate() {
+                let scaled = level.scale(start + i, row);
+                for d in 0..D {
+                    x[d] += v[start + i][d] - omega * scaled[d];
+                }
             }
-        }
+        })
     });
 }
 
 /// `v = P₀ e`.
 fn spread<const D: usize>(level: &impl Level<D>, e: &[Six], v: &mut [[f32; D]]) {
-    let aggregates = level.aggregates();
-    v.par_chunks_mut(CHUNK).enumerate().for_each(|(c, v)| {
-        let start = c * CHUNK;
+    let (aggregates, chunk) = (level.aggregates(), level.chunk());
+    v.par_chunks_mut(chunk).enumerate().for_each(|(c, v)| {
+        let start = c * chunk;
         level.each_modes(start..start + v.len(), |site, modes| {
             let v = &mut v[site - start];
             *v = [0.0; D];

@@ -1,44 +1,41 @@
-//! Owns the largest eigenvalue of `D⁻¹A` on assembled levels, which their smoothers need.
+//! Owns the largest eigenvalue of `D⁻¹A` on assembled levels, which their smoothers need, and of cycles.
 
-use super::aggregate::CHUNK;
-use super::level::Level;
+use super::level::{Level, Six};
 use rayon::prelude::*;
 
-/// Steps of the Lanczos process: an eigenvalue that stands out is found to a percent, wherever its motion is.
-const STEPS: usize = 24;
-
-/// The largest eigenvalue of `D⁻¹A`, from below: the largest of the Lanczos matrix that conjugate gradients builds for
-/// a noisy right-hand side (Golub & Van Loan, §11.3).
-pub fn largest<const D: usize>(level: &impl Level<D>) -> f32 {
-    let n = level.sites();
+/// The largest eigenvalue of `BA` on a level, from below: the largest of the Lanczos matrix that conjugate gradients builds for a
+/// noisy right-hand side in so many steps (Golub & Van Loan, §11.3). `precondition` makes `B r`; an eigenvalue that stands
+/// out is found to a percent in 24 steps, wherever its motion is.
+pub fn largest(
+    level: &impl Level<6>,
+    steps: usize,
+    mut precondition: impl FnMut(&[Six], &mut [Six]),
+) -> f32 {
+    let (n, chunk) = (level.sites(), level.chunk());
     // As much noise in every site's own measure, so that soft ones are not all there is.
-    let mut r: Vec<[f32; D]> = (0..n)
+    let mut r: Vec<Six> = (0..n)
         .into_par_iter()
         .map(|i| {
-            let noise: [f32; D] = std::array::from_fn(|d| noise((i * D + d) as u32));
-            let z = level.scale(i, &noise);
-            let own: f32 = noise.iter().zip(&z).map(|(r, z)| r * z).sum();
+            let noise: Six = std::array::from_fn(|d| noise((i * 6 + d) as u32));
+            let own = dot(&noise, &level.scale(i, &noise)) as f32;
             let scale = if own > 0.0 { own.sqrt().recip() } else { 0.0 };
             noise.map(|v| v * scale)
         })
         .collect();
-    let mut p = vec![[0.0; D]; n];
-    let mut q = vec![[0.0; D]; n];
+    let zero = vec![[0.0; 6]; n];
+    let (mut z, mut p, mut q) = (zero.clone(), zero.clone(), zero);
     let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
     let (mut rz_before, mut alpha_before) = (0.0, 1.0);
-    for step in 0..STEPS {
-        let rz: f64 = sum(n, |i| dot(&r[i], &level.scale(i, &r[i])));
+    for step in 0..steps {
+        precondition(&r, &mut z);
+        let rz: f64 = sum(n, chunk, |i| dot(&r[i], &z[i]));
         let beta = if step == 0 { 0.0 } else { rz / rz_before };
-        p.par_iter_mut().enumerate().for_each(|(i, p)| {
-            let z = level.scale(i, &r[i]);
-            for d in 0..D {
-                p[d] = z[d] + beta as f32 * p[d];
-            }
+        let values = p.par_iter_mut().with_min_len(chunk).zip(&z);
+        values.for_each(|(p, z)| *p = std::array::from_fn(|d| z[d] + beta as f32 * p[d]));
+        q.par_chunks_mut(chunk).enumerate().for_each(|(c, q)| {
+            level.rows(c * chunk..c * chunk + q.len(), &p, q);
         });
-        q.par_chunks_mut(CHUNK).enumerate().for_each(|(c, q)| {
-            level.rows(c * CHUNK..c * CHUNK + q.len(), &p, q);
-        });
-        let curvature: f64 = sum(n, |i| dot(&p[i], &q[i]));
+        let curvature: f64 = sum(n, chunk, |i| dot(&p[i], &q[i]));
         if !(rz > 0.0 && curvature > 0.0 && curvature.is_finite()) {
             break;
         }
@@ -47,24 +44,21 @@ pub fn largest<const D: usize>(level: &impl Level<D>) -> f32 {
             beside.push(beta.sqrt() / alpha_before);
         }
         diagonal.push(1.0 / alpha + beta / alpha_before);
-        r.par_iter_mut().zip(&q).for_each(|(r, q)| {
-            for d in 0..D {
-                r[d] -= alpha as f32 * q[d];
-            }
-        });
+        let values = r.par_iter_mut().with_min_len(chunk).zip(&q);
+        values.for_each(|(r, q)| *r = std::array::from_fn(|d| r[d] - alpha as f32 * q[d]));
         (rz_before, alpha_before) = (rz, alpha);
     }
     largest_of_tridiagonal(&diagonal, &beside) as f32
 }
 
-fn dot<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f64 {
+fn dot(a: &Six, b: &Six) -> f64 {
     a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum()
 }
 
 /// `Σ f(i)`, chunk by chunk.
-fn sum(n: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let chunk = |c: usize| (c * CHUNK..((c + 1) * CHUNK).min(n)).map(&f).sum::<f64>();
-    let parts: Vec<f64> = (0..n.div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
+fn sum(n: usize, size: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
+    let chunk = |c: usize| (c * size..((c + 1) * size).min(n)).map(&f).sum::<f64>();
+    let parts: Vec<f64> = (0..n.div_ceil(size)).into_par_iter().map(chunk).collect();
     parts.iter().sum()
 }
 

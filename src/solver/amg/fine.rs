@@ -1,7 +1,7 @@
 //! Owns the finest level: the caller's operator, never assembled.
 
 use super::aggregate::NONE;
-use super::aggregate::{Aggregates, CHUNK, Sums};
+use super::aggregate::{Aggregates, Sums};
 use super::diagonal::Diagonal;
 use super::grouping;
 use super::level::{Level, Modes, Six};
@@ -10,6 +10,9 @@ use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::operator::held::Held;
 use rayon::prelude::*;
 use std::ops::Range;
+
+/// Sites per task of the set-up.
+const CHUNK: usize = 2048;
 
 pub struct Fine<'a, O> {
     operator: &'a O,
@@ -43,7 +46,7 @@ impl<'a, O: Coarsen> Fine<'a, O> {
             each_strong(operator, &diagonal, &hinges, sites, visit);
         };
         let (of, count) = grouping::in_boxes(boxes, &strong, &rows);
-        let aggregates = Aggregates::new(&of, count);
+        let aggregates = Aggregates::new(&of, count, CHUNK, operator.chunk());
         drop((of, hinges));
         let frames = frames(operator, &aggregates);
         let mut fine = Fine {
@@ -249,6 +252,10 @@ fn frames(operator: &impl Coarsen, aggregates: &Aggregates) -> Vec<[f64; 4]> {
 impl<O: Coarsen> Level<3> for Fine<'_, O> {
     fn sites(&self) -> usize {
         self.diagonal.sites()
+    }
+
+    fn chunk(&self) -> usize {
+        self.operator.chunk()
     }
 
     fn rows(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {

@@ -2,6 +2,7 @@
 
 use super::aggregate::Aggregates;
 use crate::operator::coarsen::VisitRow;
+use std::cell::RefCell;
 use std::ops::Range;
 
 /// Six coarse unknowns per aggregate: the amplitudes of its rigid motions.
@@ -10,9 +11,24 @@ pub type Six = [f32; 6];
 /// The values of the six rigid motions at one site, a row per component, padded to eight lanes.
 pub type Modes<const D: usize> = [[f32; 8]; D];
 
+/// Calls `f` with room for the rows of `n` sites, whatever is in it, which the thread keeps.
+pub fn with_rows<const D: usize>(n: usize, f: impl FnOnce(&mut [[f32; D]])) {
+    thread_local! {
+        static ROOM: RefCell<Vec<f32>> = const { RefCell::new(Vec::new()) };
+    }
+    ROOM.with_borrow_mut(|room| {
+        if room.len() < n * D {
+            room.resize(n * D, 0.0);
+        }
+        f(room[..n * D].as_chunks_mut().0);
+    });
+}
+
 /// One level with `D` unknowns per site, in single precision.
 pub trait Level<const D: usize>: Sync {
     fn sites(&self) -> usize;
+    /// Sites per task.
+    fn chunk(&self) -> usize;
     /// Rows of `A x`, as [`crate::operator::coarsen::Coarsen::rows_f32`].
     fn rows(&self, sites: Range<usize>, x: &[[f32; D]], y: &mut [[f32; D]]);
     /// Calls `visit` with every site of the range, in order, and the columns and blocks of its row.

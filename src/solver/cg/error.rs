@@ -43,8 +43,8 @@ impl Default for EnergyTail {
     }
 }
 
-/// Iterations before the first estimate: two eigenvalues tell nothing of a third.
-const LEAST_ITERATIONS: usize = 3;
+/// Iterations before the first estimate: a few eigenvalues tell nothing of the next.
+const LEAST_ITERATIONS: usize = 5;
 
 /// Part of the first direction's eigenvalue that an unseen motion may have. A few iterations cannot tell: of 200 hard bodies
 /// half have an eigenvalue below it.

@@ -221,6 +221,13 @@ impl Coarsen for Bricks {
         }
     }
 
+    fn chunk(&self) -> usize {
+        match self {
+            Bricks::Homogeneous(model) => model.chunk(),
+            Bricks::Heterogeneous(model) => model.chunk(),
+        }
+    }
+
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         match self {
             Bricks::Homogeneous(model) => model.rows_f64(sites, x, y),

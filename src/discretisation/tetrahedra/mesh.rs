@@ -1,0 +1,169 @@
+//! Owns a mesh of tetrahedra between its making and its use: vertices, elements, and which vertices lie on the surface.
+
+use super::fit;
+use super::lattice::Lattice;
+use super::snap::{Side, Snapped};
+use super::stencils::{self, Vertex};
+use super::surface::Surface;
+use crate::error::{Error, Result};
+use rayon::prelude::*;
+
+/// Corners of an element by vertex; the volume `(b − a) × (c − a) · (d − a) / 6` is positive.
+pub type Corners = [u32; 4];
+
+/// Four-cornered elements.
+#[derive(Debug, Clone, Default)]
+pub struct Mesh {
+    pub vertices_mm: Vec<[f64; 3]>,
+    /// Whether a vertex was put on the surface.
+    pub on_surface: Vec<bool>,
+    pub elements: Vec<Corners>,
+    /// Edge lengths of the box.
+    pub size_mm: [f64; 3],
+    /// Mean edge of the lattice's cells.
+    pub cell_mm: f64,
+}
+
+/// Vertices that 32 bits number.
+const MOST: usize = u32::MAX as usize;
+
+/// The bone that `surface` encloses in its box, in cells of the lattice.
+///
+/// # Errors
+/// More vertices than can be numbered.
+pub fn fill(surface: &Surface, lattice: &Lattice) -> Result<Mesh> {
+    if lattice.vertices() > MOST {
+        return Err(Error::setting(
+            "element_mm",
+            format!("{} lattice vertices are too many to number", lattice.vertices()),
+            "take a larger element or crop the scan",
+        ));
+    }
+    let snapped = Snapped::new(lattice, surface);
+    let lattices = lattice.vertices();
+    if lattices + snapped.cuts.len() > MOST {
+        return Err(Error::setting(
+            "element_mm",
+            "more vertices than can be numbered",
+            "take a larger element or crop the scan",
+        ));
+    }
+    let layers: Vec<Vec<Corners>> = (0..lattice.n[2])
+        .into_par_iter()
+        .map(|layer| {
+            let mut elements = Vec::new();
+            lattice.each_tetrahedron(layer, |t| {
+                stencils::fill(&snapped, t, &mut |v| {
+                    elements.push(v.map(|v| match v {
+                        Vertex::Lattice(v) => v,
+                        Vertex::Cut(c) => (lattices + c as usize) as u32,
+                    }));
+                });
+            });
+            elements
+        })
+        .collect();
+    let mut mesh = numbered(layers.concat(), &snapped);
+    mesh.orient();
+    fit::fit(&mut mesh, surface);
+    Ok(mesh)
+}
+
+/// Gives the vertices that are used numbers of their own, in the order of the lattice.
+fn numbered(mut elements: Vec<Corners>, snapped: &Snapped) -> Mesh {
+    let lattices = snapped.lattice.vertices();
+    let mut name = vec![u32::MAX; lattices + snapped.cuts.len()];
+    elements.iter().flatten().for_each(|v| name[*v as usize] = 0);
+    let used: Vec<u32> = (0..name.len() as u32).filter(|v| name[*v as usize] == 0).collect();
+    used.iter().enumerate().for_each(|(i, v)| name[*v as usize] = i as u32);
+    elements
+        .par_iter_mut()
+        .for_each(|e| *e = e.map(|v| name[v as usize]));
+    let place = |v: &u32| match (*v as usize).checked_sub(lattices) {
+        None => snapped.position_mm(*v as usize),
+        Some(cut) => snapped.cuts[cut].at_mm,
+    };
+    let on = |v: &u32| *v as usize >= lattices || snapped.sides[*v as usize] == Side::On;
+    Mesh {
+        vertices_mm: used.par_iter().map(place).collect(),
+        on_surface: used.par_iter().map(on).collect(),
+        elements,
+        size_mm: snapped.lattice.ends_mm(),
+        cell_mm: snapped.lattice.size_mm(),
+    }
+}
+
+impl Mesh {
+    pub fn corners(&self, e: &Corners) -> [[f64; 3]; 4] {
+        e.map(|v| self.vertices_mm[v as usize])
+    }
+
+    fn orient(&mut self) {
+        let vertices = &self.vertices_mm;
+        self.elements.par_iter_mut().for_each(|e| {
+            if volume(e.map(|v| vertices[v as usize])) < 0.0 {
+                e.swap(2, 3);
+            }
+        });
+    }
+
+    /// Volume of all elements.
+    pub fn volume_mm3(&self) -> f64 {
+        crate::par::sum_chunks(self.elements.len(), |range| {
+            self.elements[range].iter().map(|e| volume(self.corners(e))).sum()
+        })
+    }
+
+    /// By axis, whether a place lies on the lower (1) or the upper (2) face of the box; 0: neither.
+    pub fn faces_at(&self, at: [f64; 3]) -> [u8; 3] {
+        std::array::from_fn(|a| {
+            let near = 1e-9 * self.size_mm[a];
+            u8::from(at[a] < near) | u8::from(at[a] > self.size_mm[a] - near) << 1
+        })
+    }
+
+    /// The same mesh of the elements that `keep` names, without vertices that none uses.
+    pub fn retain(&mut self, keep: impl Fn(usize) -> bool) {
+        let mut at = 0;
+        self.elements.retain(|_| {
+            at += 1;
+            keep(at - 1)
+        });
+        let mut name = vec![u32::MAX; self.vertices_mm.len()];
+        self.elements.iter().flatten().for_each(|v| name[*v as usize] = 0);
+        let mut next = 0;
+        for v in name.iter_mut().filter(|v| **v == 0) {
+            *v = next;
+            next += 1;
+        }
+        let used = |v: usize| name[v] != u32::MAX;
+        let mut v = 0;
+        self.vertices_mm.retain(|_| {
+            v += 1;
+            used(v - 1)
+        });
+        v = 0;
+        self.on_surface.retain(|_| {
+            v += 1;
+            used(v - 1)
+        });
+        self.elements.iter_mut().for_each(|e| *e = e.map(|v| name[v as usize]));
+    }
+}
+
+pub fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[c] - b[c])
+}
+
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|c| a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3])
+}
+
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Signed volume of a tetrahedron.
+pub fn volume([a, b, c, d]: [[f64; 3]; 4]) -> f64 {
+    dot(cross(minus(b, a), minus(c, a)), minus(d, a)) / 6.0
+}

@@ -127,3 +127,18 @@ pub fn row(shape: &[f32; 10], [lambda, mu]: [f32; 2], node: usize) -> [[[f32; 3]
     }
     row
 }
+
+/// Row `corner` of the four-node element with the same corners, by columns.
+pub fn linear_row(shape: &[f32; 10], [lambda, mu]: [f32; 2], corner: usize) -> [[[f32; 3]; 3]; 4] {
+    let [b, c, d] = [0, 1, 2].map(|i| [shape[3 * i], shape[3 * i + 1], shape[3 * i + 2]]);
+    let slopes = [[0, 1, 2].map(|i| -(b[i] + c[i] + d[i])), b, c, d];
+    let g = slopes[corner];
+    slopes.map(|h| {
+        let both = mu * (g[0] * h[0] + g[1] * h[1] + g[2] * h[2]);
+        let entry = |r: usize, c: usize| {
+            let shear = mu * g[c] * h[r] + if r == c { both } else { 0.0 };
+            shape[9] * (lambda * g[r] * h[c] + shear)
+        };
+        std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c)))
+    })
+}

@@ -6,12 +6,15 @@
 
 pub mod element;
 mod kernel;
+mod linear;
 pub mod strain;
 
 use crate::discretisation::tetrahedra::nodes::TetMesh;
 use crate::operator::Operator;
+use crate::operator::assembled::Assembled;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use element::Shape;
+use linear::Corners;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -36,6 +39,9 @@ pub struct Tet10 {
     starts: Vec<u32>,
     around: Vec<u32>,
     reaches: Vec<[u32; 2]>,
+    corners: Corners,
+    /// What the corners alone make, for multigrid.
+    linear: Assembled,
 }
 
 impl Tet10 {
@@ -79,7 +85,8 @@ impl Tet10 {
             columns.fold([u32::MAX, 0], |[low, high], n| [low.min(n), high.max(n)])
         };
         let reaches = (0..nodes.div_ceil(SPAN)).into_par_iter().map(span).collect();
-        Tet10 {
+        let corners = Corners::of(&mesh);
+        let mut model = Tet10 {
             lambda: young_mpa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
             mu: young_mpa / (2.0 * (1.0 + poisson)),
             factor,
@@ -88,8 +95,19 @@ impl Tet10 {
             starts,
             around,
             reaches,
+            linear: Assembled::of_rows(Vec::new(), 0.0, |_, _, _| ()),
+            corners: Corners::of(&TetMesh::default()),
             mesh,
-        }
+        };
+        model.linear = linear::assemble(&model, &corners);
+        model.corners = corners;
+        model
+    }
+
+    /// Mean number of blocks of nodes that an element stands about.
+    pub fn repeats(&self) -> f64 {
+        let all: usize = self.blocks.iter().map(Vec::len).sum();
+        all as f64 / self.mesh.elements.len() as f64
     }
 
     pub fn nodes(&self) -> usize {

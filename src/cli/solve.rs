@@ -25,7 +25,7 @@ pub struct SolveArgs {
     lattice: LatticeSettings,
     /// Choose the resolution so that the stated error (solver, elements, shape) stays below this, as 3% or
     /// 0.03; exit 1 where it cannot be met
-    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "lp", "boundary", "structure"])]
+    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "element_mm", "lp", "boundary", "structure"])]
     error: Option<f64>,
     /// voxel-fe: also write the model for another program: inp (CalculiX, Abaqus)
     #[arg(long, value_name = "FORMAT", value_parser = ["inp"])]
@@ -38,7 +38,8 @@ pub struct SolveArgs {
 #[derive(Args)]
 #[command(next_help_heading = "Solve")]
 pub struct SolveSettings {
-    /// lattice (the lattice element method), or voxel-fe (one hexahedron per bone voxel) [default: lattice]
+    /// lattice (the lattice element method), voxel-fe (one hexahedron per bone voxel), or geometry-fe (tetrahedra of ten
+    /// nodes inside the smooth surface of the bone) [default: lattice]
     #[arg(long, value_parser = words::choice::<Method>(Method::WORDS))]
     method: Option<Method>,
     #[command(flatten)]
@@ -78,6 +79,9 @@ pub struct SolveSettings {
     /// voxel-fe: one element per N³ voxels
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     coarsen: Option<u16>,
+    /// geometry-fe: edge of the cells that elements are made in [default: from the thickness of the struts]
+    #[arg(long, value_name = "MM", value_parser = words::positive)]
+    element_mm: Option<f64>,
     /// What becomes of N³ voxels: threshold (bone where at least half of them is), or fraction (the modulus times the bone
     /// fraction) [default: threshold]
     #[arg(long, value_name = "RULE", value_parser = words::choice::<CoarsenBy>(&["threshold", "fraction"]), requires = "coarsen")]
@@ -122,6 +126,7 @@ impl SolveSettings {
         };
         params.coarsen_by = self.coarsen_by.unwrap_or(params.coarsen_by);
         params.coarsen = self.coarsen.map_or(params.coarsen, usize::from);
+        params.element_mm = self.element_mm.or(params.element_mm);
         params.mechanisms |= self.mechanisms;
         if !self.fields.is_empty() {
             params.fields.clone_from(&self.fields);

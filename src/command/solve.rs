@@ -402,6 +402,9 @@ fn with_recorded(mut row: Row, recorded: &Recorded) -> Row {
             factor: f.factor,
         });
     }
+    if let Some(note) = &recorded.note {
+        notes::add(&mut row.marks.note, note);
+    }
     row
 }
 

@@ -34,7 +34,10 @@ impl Assembled {
             }
             (ends, columns, blocks)
         };
-        let parts: Vec<_> = (0..sites.div_ceil(ROWS)).into_par_iter().map(part).collect();
+        let parts: Vec<_> = (0..sites.div_ceil(ROWS))
+            .into_par_iter()
+            .map(part)
+            .collect();
         let mut all = Assembled {
             positions_mm,
             starts: vec![0],

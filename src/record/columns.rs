@@ -140,7 +140,7 @@ const ANSWERS: [Column; 22] = [
 
 const RESULTS: [Column; 47] = [
     SCAN,
-    column("method", "", "lattice or voxel-fe"),
+    column("method", "", "lattice, voxel-fe or geometry-fe"),
     column(
         "structure",
         "",
@@ -154,7 +154,7 @@ const RESULTS: [Column; 47] = [
     column(
         "lp_mm",
         "mm",
-        "lattice parameter; of voxel-fe the element size",
+        "lattice parameter; of voxel-fe and geometry-fe the element size",
     ),
     column("registration", "mm", "shift of the lattice, x;y;z"),
     column("voxel_mm", "mm", "voxel edge; x;y;z where they differ"),

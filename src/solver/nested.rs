@@ -2,9 +2,9 @@
 //!
 //! One symmetric cycle: Chebyshev polynomials of `D⁻¹A` before and after the correction by [`Amg`]. In single precision.
 
-use crate::operator::{MixedPrecision, Operator, SinglePreconditioner};
 use crate::operator::held::Held;
 use crate::operator::nested::Nested;
+use crate::operator::{MixedPrecision, Operator, SinglePreconditioner};
 use crate::par::CHUNK;
 use crate::solver::amg::{Amg, AmgParams};
 use rayon::prelude::*;
@@ -56,7 +56,10 @@ impl<'a, O: Nested> TwoLevel<'a, O> {
 
     /// Sites of each level, finest first.
     pub fn levels(&self) -> Vec<usize> {
-        [self.inverse.len()].into_iter().chain(self.amg.levels()).collect()
+        [self.inverse.len()]
+            .into_iter()
+            .chain(self.amg.levels())
+            .collect()
     }
 
     /// Adds to `z` what the smoother makes of the residual, and leaves the new residual where that is asked for.
@@ -70,13 +73,19 @@ impl<'a, O: Nested> TwoLevel<'a, O> {
             if k == DEGREE && !wants_residual {
                 break;
             }
-            let Room { residual, direction, image, .. } = room;
-            self.operator.apply_single(direction, image, |first, image| {
-                for (q, r) in image.iter_mut().zip(&residual[first..]) {
-                    (0..3).for_each(|c| q[c] = r[c] - q[c]);
-                }
-                0.0
-            });
+            let Room {
+                residual,
+                direction,
+                image,
+                ..
+            } = room;
+            self.operator
+                .apply_single(direction, image, |first, image| {
+                    for (q, r) in image.iter_mut().zip(&residual[first..]) {
+                        (0..3).for_each(|c| q[c] = r[c] - q[c]);
+                    }
+                    0.0
+                });
             std::mem::swap(residual, image);
             if k < DEGREE {
                 let next = 1.0 / (2.0 * ratio - rho);
@@ -91,7 +100,11 @@ impl<'a, O: Nested> TwoLevel<'a, O> {
         room.direction
             .par_chunks_mut(CHUNK)
             .zip(z.par_chunks_mut(CHUNK))
-            .zip(room.residual.par_chunks(CHUNK).zip(self.inverse.par_chunks(CHUNK)))
+            .zip(
+                room.residual
+                    .par_chunks(CHUNK)
+                    .zip(self.inverse.par_chunks(CHUNK)),
+            )
             .for_each(|((d, z), (r, inverse))| {
                 for (((d, z), r), inverse) in d.iter_mut().zip(z).zip(r).zip(inverse) {
                     let scaled = times(inverse, r);
@@ -123,18 +136,21 @@ impl<O: Nested> SinglePreconditioner<3> for TwoLevel<'_, O> {
         clear(&self.held, b);
         self.amg.apply_single(b, x, spare);
         self.operator.add_prolonged(x, z);
-        self.operator.apply_single(z, &mut room.residual, |first, image| {
-            for (q, r) in image.iter_mut().zip(&r[first..]) {
-                (0..3).for_each(|c| q[c] = r[c] - q[c]);
-            }
-            0.0
-        });
+        self.operator
+            .apply_single(z, &mut room.residual, |first, image| {
+                for (q, r) in image.iter_mut().zip(&r[first..]) {
+                    (0..3).for_each(|c| q[c] = r[c] - q[c]);
+                }
+                0.0
+            });
         self.smooth(room, z, false);
     }
 }
 
 fn clear(held: &Held, v: &mut [[f32; 3]]) {
     for (v, &bits) in v.iter_mut().zip(&held.0).filter(|(_, bits)| **bits != 0) {
-        (0..3).filter(|c| bits & (1 << c) != 0).for_each(|c| v[c] = 0.0);
+        (0..3)
+            .filter(|c| bits & (1 << c) != 0)
+            .for_each(|c| v[c] = 0.0);
     }
 }

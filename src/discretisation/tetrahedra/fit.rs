@@ -17,7 +17,7 @@ const LEAST_LEFT: f64 = 0.4;
 
 /// Fits free faces to the surface; those on the faces of the box stay in them.
 pub fn fit(mesh: &mut Mesh, surface: &Surface) {
-    let faces = Faces::of(mesh).free;
+    let faces = Faces::of(&mesh.elements).free;
     let most = MOST * mesh.cell_mm;
     // Twice the area with its direction, and the gap.
     let of_face = |face: &u32| {
@@ -72,7 +72,12 @@ pub fn fit(mesh: &mut Mesh, surface: &Surface) {
             let was = volume(e.map(|v| before[v as usize]));
             volume(mesh.corners(e)) < LEAST_LEFT * was
         };
-        let spoilt: Vec<u32> = mesh.elements.par_iter().filter(spoilt).flat_map_iter(|e| *e).collect();
+        let spoilt: Vec<u32> = mesh
+            .elements
+            .par_iter()
+            .filter(spoilt)
+            .flat_map_iter(|e| *e)
+            .collect();
         if spoilt.is_empty() {
             return;
         }

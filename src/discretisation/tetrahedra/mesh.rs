@@ -35,7 +35,10 @@ pub fn fill(surface: &Surface, lattice: &Lattice) -> Result<Mesh> {
     if lattice.vertices() > MOST {
         return Err(Error::setting(
             "element_mm",
-            format!("{} lattice vertices are too many to number", lattice.vertices()),
+            format!(
+                "{} lattice vertices are too many to number",
+                lattice.vertices()
+            ),
             "take a larger element or crop the scan",
         ));
     }
@@ -73,9 +76,16 @@ pub fn fill(surface: &Surface, lattice: &Lattice) -> Result<Mesh> {
 fn numbered(mut elements: Vec<Corners>, snapped: &Snapped) -> Mesh {
     let lattices = snapped.lattice.vertices();
     let mut name = vec![u32::MAX; lattices + snapped.cuts.len()];
-    elements.iter().flatten().for_each(|v| name[*v as usize] = 0);
-    let used: Vec<u32> = (0..name.len() as u32).filter(|v| name[*v as usize] == 0).collect();
-    used.iter().enumerate().for_each(|(i, v)| name[*v as usize] = i as u32);
+    elements
+        .iter()
+        .flatten()
+        .for_each(|v| name[*v as usize] = 0);
+    let used: Vec<u32> = (0..name.len() as u32)
+        .filter(|v| name[*v as usize] == 0)
+        .collect();
+    used.iter()
+        .enumerate()
+        .for_each(|(i, v)| name[*v as usize] = i as u32);
     elements
         .par_iter_mut()
         .for_each(|e| *e = e.map(|v| name[v as usize]));
@@ -110,16 +120,16 @@ impl Mesh {
     /// Volume of all elements.
     pub fn volume_mm3(&self) -> f64 {
         crate::par::sum_chunks(self.elements.len(), |range| {
-            self.elements[range].iter().map(|e| volume(self.corners(e))).sum()
+            self.elements[range]
+                .iter()
+                .map(|e| volume(self.corners(e)))
+                .sum()
         })
     }
 
-    /// By axis, whether a place lies on the lower (1) or the upper (2) face of the box; 0: neither.
+    /// See [`faces_at`].
     pub fn faces_at(&self, at: [f64; 3]) -> [u8; 3] {
-        std::array::from_fn(|a| {
-            let near = 1e-9 * self.size_mm[a];
-            u8::from(at[a] < near) | u8::from(at[a] > self.size_mm[a] - near) << 1
-        })
+        faces_at(self.size_mm, at)
     }
 
     /// The same mesh of the elements that `keep` names, without vertices that none uses.
@@ -130,7 +140,10 @@ impl Mesh {
             keep(at - 1)
         });
         let mut name = vec![u32::MAX; self.vertices_mm.len()];
-        self.elements.iter().flatten().for_each(|v| name[*v as usize] = 0);
+        self.elements
+            .iter()
+            .flatten()
+            .for_each(|v| name[*v as usize] = 0);
         let mut next = 0;
         for v in name.iter_mut().filter(|v| **v == 0) {
             *v = next;
@@ -147,8 +160,18 @@ impl Mesh {
             v += 1;
             used(v - 1)
         });
-        self.elements.iter_mut().for_each(|e| *e = e.map(|v| name[v as usize]));
+        self.elements
+            .iter_mut()
+            .for_each(|e| *e = e.map(|v| name[v as usize]));
     }
+}
+
+/// By axis, whether a place lies on the lower (1) or the upper (2) face of a box; 0: neither.
+pub fn faces_at(size_mm: [f64; 3], at: [f64; 3]) -> [u8; 3] {
+    std::array::from_fn(|a| {
+        let near = 1e-9 * size_mm[a];
+        u8::from(at[a] < near) | u8::from(at[a] > size_mm[a] - near) << 1
+    })
 }
 
 pub fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

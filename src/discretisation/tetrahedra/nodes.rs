@@ -1,6 +1,6 @@
 //! Owns the nodes of ten-node elements: corners and middles of edges, numbered along the box so that neighbours are near.
 
-use super::mesh::Mesh;
+use super::mesh::{self, Mesh};
 use rayon::prelude::*;
 
 /// Corners, then the middles of the edges [`EDGES`].
@@ -27,6 +27,11 @@ const SLAB: f64 = 1.0;
 const STRIP: f64 = 4.0;
 
 impl TetMesh {
+    /// See [`mesh::faces_at`].
+    pub fn faces_at(&self, at: [f64; 3]) -> [u8; 3] {
+        mesh::faces_at(self.size_mm, at)
+    }
+
     pub fn of(mesh: &Mesh) -> TetMesh {
         let corners = mesh.vertices_mm.len();
         let key = |slot: usize| {
@@ -34,8 +39,10 @@ impl TetMesh {
             let [a, b] = EDGES[slot % 6].map(|c| e[c]);
             (u64::from(a.min(b)) << 32 | u64::from(a.max(b)), slot as u32)
         };
-        let mut slots: Vec<(u64, u32)> =
-            (0..6 * mesh.elements.len()).into_par_iter().map(key).collect();
+        let mut slots: Vec<(u64, u32)> = (0..6 * mesh.elements.len())
+            .into_par_iter()
+            .map(key)
+            .collect();
         slots.par_sort_unstable();
         let mut elements: Vec<Ten> = mesh
             .elements
@@ -44,8 +51,8 @@ impl TetMesh {
             .collect();
         let mut at_mm = mesh.vertices_mm.clone();
         for group in slots.chunk_by(|a, b| a.0 == b.0) {
-            let [a, b] = [group[0].0 >> 32, group[0].0 & 0xffff_ffff]
-                .map(|v| mesh.vertices_mm[v as usize]);
+            let [a, b] =
+                [group[0].0 >> 32, group[0].0 & 0xffff_ffff].map(|v| mesh.vertices_mm[v as usize]);
             let node = at_mm.len() as u32;
             at_mm.push([0, 1, 2].map(|c| 0.5 * (a[c] + b[c])));
             for (_, slot) in group {
@@ -56,7 +63,10 @@ impl TetMesh {
         let edges = at_mm.len() - corners;
         let order = order(&at_mm, mesh.cell_mm);
         let mut name = vec![0u32; at_mm.len()];
-        order.iter().enumerate().for_each(|(i, v)| name[*v as usize] = i as u32);
+        order
+            .iter()
+            .enumerate()
+            .for_each(|(i, v)| name[*v as usize] = i as u32);
         elements
             .par_iter_mut()
             .for_each(|e| *e = e.map(|v| name[v as usize]));

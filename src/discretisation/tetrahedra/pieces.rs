@@ -1,6 +1,6 @@
 //! Owns which elements share faces, which faces are free, and which connected pieces reach what they must.
 
-use super::mesh::Mesh;
+use super::mesh::{Corners, Mesh};
 use rayon::prelude::*;
 
 /// The three corners across from corner `c`, seen from outside in the order of a positive area.
@@ -18,16 +18,16 @@ pub struct Faces {
 impl Faces {
     /// # Panics
     /// At 2³⁰ elements or more.
-    pub fn of(mesh: &Mesh) -> Faces {
-        assert!(mesh.elements.len() < 1 << 30, "too many elements");
+    pub fn of(elements: &[Corners]) -> Faces {
+        assert!(elements.len() < 1 << 30, "too many elements");
         let face = |f: usize| {
-            let e = mesh.elements[f / 4];
+            let e = elements[f / 4];
             let mut corners = FACES[f % 4].map(|c| e[c]);
             corners.sort_unstable();
             (corners, f as u32)
         };
         let mut faces: Vec<([u32; 3], u32)> =
-            (0..4 * mesh.elements.len()).into_par_iter().map(face).collect();
+            (0..4 * elements.len()).into_par_iter().map(face).collect();
         faces.par_sort_unstable();
         let (mut shared, mut free) = (Vec::new(), Vec::new());
         for group in faces.chunk_by(|a, b| a.0 == b.0) {
@@ -97,7 +97,7 @@ pub struct Loaded {
 
 /// Keeps the pieces that carry load.
 pub fn keep(mesh: &mut Mesh, keep: Keep) -> Loaded {
-    let faces = Faces::of(mesh);
+    let faces = Faces::of(&mesh.elements);
     let (piece, count) = pieces(mesh.elements.len(), &faces.shared);
     let mut touched = vec![0u8; count];
     for face in &faces.free {

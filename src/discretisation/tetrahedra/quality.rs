@@ -1,6 +1,8 @@
 //! Owns what is measured of a mesh: dihedral angles, and the Euler number.
 
 use super::mesh::{Mesh, cross, dot, minus};
+use super::nodes::EDGES;
+use super::pieces::Faces;
 use rayon::prelude::*;
 
 /// Least and largest dihedral angle that the method bounds, in degrees (Labelle & Shewchuk 2007, table 1).
@@ -30,7 +32,11 @@ pub fn angles(corners: [[f64; 3]; 4]) -> [f64; 2] {
     let mut range = [180.0f64, 0.0f64];
     for a in 0..4 {
         for b in a + 1..4 {
-            let angle = 180.0 - dot(normals[a], normals[b]).clamp(-1.0, 1.0).acos().to_degrees();
+            let angle = 180.0
+                - dot(normals[a], normals[b])
+                    .clamp(-1.0, 1.0)
+                    .acos()
+                    .to_degrees();
             range = [range[0].min(angle), range[1].max(angle)];
         }
     }
@@ -56,15 +62,24 @@ pub fn quality(mesh: &Mesh) -> Quality {
         outside: 0,
         outside_inside_box: 0,
     };
-    mesh.elements.par_iter().map(of).reduce(none, |a, b| Quality {
-        least_degrees: a.least_degrees.min(b.least_degrees),
-        largest_degrees: a.largest_degrees.max(b.largest_degrees),
-        outside: a.outside + b.outside,
-        outside_inside_box: a.outside_inside_box + b.outside_inside_box,
-    })
+    mesh.elements
+        .par_iter()
+        .map(of)
+        .reduce(none, |a, b| Quality {
+            least_degrees: a.least_degrees.min(b.least_degrees),
+            largest_degrees: a.largest_degrees.max(b.largest_degrees),
+            outside: a.outside + b.outside,
+            outside_inside_box: a.outside_inside_box + b.outside_inside_box,
+        })
 }
 
-/// Vertices less edges plus faces less elements.
-pub fn euler(vertices: usize, edges: usize, shared_faces: usize, free_faces: usize, elements: usize) -> i64 {
-    vertices as i64 - edges as i64 + (shared_faces + free_faces) as i64 - elements as i64
+/// Euler's number: vertices less edges plus faces less elements.
+pub fn euler(mesh: &Mesh) -> i64 {
+    let faces = Faces::of(&mesh.elements);
+    let ends = |e: &[u32; 4]| EDGES.map(|[a, b]| (e[a].min(e[b]), e[a].max(e[b])));
+    let mut edges: Vec<(u32, u32)> = mesh.elements.par_iter().flat_map_iter(ends).collect();
+    edges.par_sort_unstable();
+    edges.dedup();
+    let even = mesh.vertices_mm.len() + faces.shared.len() + faces.free.len();
+    even as i64 - (edges.len() + mesh.elements.len()) as i64
 }

@@ -28,7 +28,11 @@ pub fn fill(snapped: &Snapped, tetrahedron: [Place; 4], emit: &mut impl FnMut([V
         list[counts[k]] = p;
         counts[k] += 1;
     }
-    let (plus, on, minus) = (&mut plus[..counts[0]], &on[..counts[1]], &minus[..counts[2]]);
+    let (plus, on, minus) = (
+        &mut plus[..counts[0]],
+        &on[..counts[1]],
+        &minus[..counts[2]],
+    );
     let whole = |p: Place| Vertex::Lattice(number(p) as u32);
     let cut = |p: Place, m: Place| Vertex::Cut(snapped.cut(number(p), number(m)) as u32);
     match (&mut *plus, on, minus) {
@@ -36,12 +40,19 @@ pub fn fill(snapped: &Snapped, tetrahedron: [Place; 4], emit: &mut impl FnMut([V
         (_, _, []) => emit(tetrahedron.map(whole)),
         ([a], on, minus) => {
             let mut all = [whole(*a); 4];
-            let rest = on.iter().map(|p| whole(*p)).chain(minus.iter().map(|m| cut(*a, *m)));
+            let rest = on
+                .iter()
+                .map(|p| whole(*p))
+                .chain(minus.iter().map(|m| cut(*a, *m)));
             all[1..].iter_mut().zip(rest).for_each(|(v, p)| *v = p);
             emit(all);
         }
         ([a, b], [on], [m]) => {
-            let [a, b] = if starts(*a, *b, *m) { [*a, *b] } else { [*b, *a] };
+            let [a, b] = if starts(*a, *b, *m) {
+                [*a, *b]
+            } else {
+                [*b, *a]
+            };
             // The quadrilateral a, b, b's cut, a's cut is split from a.
             emit([whole(*on), whole(a), whole(b), cut(b, *m)]);
             emit([whole(*on), whole(a), cut(b, *m), cut(a, *m)]);

@@ -99,7 +99,11 @@ impl Surface {
     pub fn value(&self, at_mm: [f64; 3]) -> f64 {
         let [x, y, z] = self.taps(at_mm);
         let of = |b: &Bound| {
-            let sum = sum(&b.values, [&x, &y, &z], [&x.weights, &y.weights, &z.weights]);
+            let sum = sum(
+                &b.values,
+                [&x, &y, &z],
+                [&x.weights, &y.weights, &z.weights],
+            );
             f64::from(b.sign) * (sum - f64::from(b.level))
         };
         self.bounds.iter().map(of).fold(f64::INFINITY, f64::min)

@@ -52,7 +52,9 @@ impl Shape {
     pub fn block(&self, [lambda, mu]: [f64; 2], a: usize, b: usize) -> [[f64; 3]; 3] {
         let slopes = self.all();
         let mut sum = [[0.0; 3]; 3];
-        for (i, j, weight) in terms(a).flat_map(|(i, p)| terms(b).map(move |(j, q)| (i, j, product(p, q)))) {
+        for (i, j, weight) in
+            terms(a).flat_map(|(i, p)| terms(b).map(move |(j, q)| (i, j, product(p, q))))
+        {
             let (g, h) = (slopes[i], slopes[j]);
             let both = g[0] * h[0] + g[1] * h[1] + g[2] * h[2];
             for r in 0..3 {

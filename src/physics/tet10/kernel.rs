@@ -109,7 +109,8 @@ fn forces<T: Precision>(
     [lambda, mu]: [Wide<T>; 2],
 ) -> [Vector<T>; 10] {
     let zero = Wide([T::default(); LANES]);
-    let slopes: [Vector<T>; 3] = std::array::from_fn(|i| std::array::from_fn(|d| shapes[3 * i + d]));
+    let slopes: [Vector<T>; 3] =
+        std::array::from_fn(|i| std::array::from_fn(|d| shapes[3 * i + d]));
     let three = |v: Wide<T>| v + v + v;
     let four = |v: Wide<T>| {
         let two = v + v;

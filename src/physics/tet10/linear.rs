@@ -62,28 +62,37 @@ const EIGENVALUE_BOUND: f64 = 4.0;
 /// The operator of the corners alone.
 pub fn assemble(model: &Tet10, corners: &Corners) -> Assembled {
     let moduli = [model.lambda as f32, model.mu as f32];
-    let positions = corners.nodes.iter().map(|n| model.mesh.nodes_mm[*n as usize]);
-    Assembled::of_rows(positions.collect(), EIGENVALUE_BOUND, |corner, columns, blocks| {
-        let first = columns.len();
-        let node = corners.nodes[corner] as usize;
-        for a in model.around(node) {
-            let (e, local) = (*a as usize / 16, *a as usize % 16);
-            let row = element::linear_row(&model.shapes[e], moduli, local);
-            for (n, block) in model.mesh.elements[e].iter().zip(&row) {
-                let [column, _] = corners.of_node[*n as usize];
-                match columns[first..].iter().position(|c| *c == column) {
-                    Some(at) => {
-                        let sum = blocks[first + at].as_flattened_mut();
-                        sum.iter_mut().zip(block.as_flattened()).for_each(|(s, b)| *s += b);
-                    }
-                    None => {
-                        columns.push(column);
-                        blocks.push(*block);
+    let positions = corners
+        .nodes
+        .iter()
+        .map(|n| model.mesh.nodes_mm[*n as usize]);
+    Assembled::of_rows(
+        positions.collect(),
+        EIGENVALUE_BOUND,
+        |corner, columns, blocks| {
+            let first = columns.len();
+            let node = corners.nodes[corner] as usize;
+            for a in model.around(node) {
+                let (e, local) = (*a as usize / 16, *a as usize % 16);
+                let row = element::linear_row(&model.shapes[e], moduli, local);
+                for (n, block) in model.mesh.elements[e].iter().zip(&row) {
+                    let [column, _] = corners.of_node[*n as usize];
+                    match columns[first..].iter().position(|c| *c == column) {
+                        Some(at) => {
+                            let sum = blocks[first + at].as_flattened_mut();
+                            sum.iter_mut()
+                                .zip(block.as_flattened())
+                                .for_each(|(s, b)| *s += b);
+                        }
+                        None => {
+                            columns.push(column);
+                            blocks.push(*block);
+                        }
                     }
                 }
             }
-        }
-    })
+        },
+    )
 }
 
 /// Nodes per parallel task.
@@ -97,31 +106,51 @@ impl Nested for Tet10 {
     }
 
     fn held_of_coarse(&self, held: &Held) -> Held {
-        Held(self.corners.nodes.iter().map(|n| held.0[*n as usize]).collect())
+        Held(
+            self.corners
+                .nodes
+                .iter()
+                .map(|n| held.0[*n as usize])
+                .collect(),
+        )
     }
 
     fn restrict(&self, fine: &[[f32; 3]], coarse: &mut [[f32; 3]]) {
-        let Corners { nodes, starts, middles, .. } = &self.corners;
-        coarse.par_iter_mut().with_min_len(PART).enumerate().for_each(|(c, sum)| {
-            *sum = fine[nodes[c] as usize];
-            for m in &middles[starts[c] as usize..starts[c + 1] as usize] {
-                let middle = &fine[*m as usize];
-                (0..3).for_each(|a| sum[a] += 0.5 * middle[a]);
-            }
-        });
+        let Corners {
+            nodes,
+            starts,
+            middles,
+            ..
+        } = &self.corners;
+        coarse
+            .par_iter_mut()
+            .with_min_len(PART)
+            .enumerate()
+            .for_each(|(c, sum)| {
+                *sum = fine[nodes[c] as usize];
+                for m in &middles[starts[c] as usize..starts[c + 1] as usize] {
+                    let middle = &fine[*m as usize];
+                    (0..3).for_each(|a| sum[a] += 0.5 * middle[a]);
+                }
+            });
     }
 
     fn add_prolonged(&self, coarse: &[[f32; 3]], fine: &mut [[f32; 3]]) {
         let ends = self.corners.of_node.par_iter();
-        fine.par_iter_mut().with_min_len(PART).zip(ends).for_each(|(u, [a, b])| {
-            let (a, b) = (&coarse[*a as usize], &coarse[*b as usize]);
-            (0..3).for_each(|c| u[c] += 0.5 * (a[c] + b[c]));
-        });
+        fine.par_iter_mut()
+            .with_min_len(PART)
+            .zip(ends)
+            .for_each(|(u, [a, b])| {
+                let (a, b) = (&coarse[*a as usize], &coarse[*b as usize]);
+                (0..3).for_each(|c| u[c] += 0.5 * (a[c] + b[c]));
+            });
     }
 
     fn inverse_diagonal(&self, held: &Held) -> Vec<[f32; 6]> {
         let nodes = (0..self.nodes()).into_par_iter();
-        nodes.map(|n| inverse(self.own_block(n), held.0[n])).collect()
+        nodes
+            .map(|n| inverse(self.own_block(n), held.0[n]))
+            .collect()
     }
 }
 
@@ -154,6 +183,10 @@ fn inverse(block: [[f64; 3]; 3], held: u8) -> [f32; 6] {
     let determinant: f64 = (0..3).map(|c| a(0, c) * minor(0, c)).sum();
     [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)].map(|(r, c)| {
         let both = free[r] && free[c] && determinant > 0.0;
-        if both { (minor(c, r) / determinant) as f32 } else { 0.0 }
+        if both {
+            (minor(c, r) / determinant) as f32
+        } else {
+            0.0
+        }
     })
 }

@@ -81,10 +81,15 @@ impl Tet10 {
         let span = |s: usize| {
             let nodes = s * SPAN..((s + 1) * SPAN).min(nodes);
             let of = starts[nodes.start] as usize..starts[nodes.end] as usize;
-            let columns = around[of].iter().flat_map(|a| mesh.elements[*a as usize / 16]);
+            let columns = around[of]
+                .iter()
+                .flat_map(|a| mesh.elements[*a as usize / 16]);
             columns.fold([u32::MAX, 0], |[low, high], n| [low.min(n), high.max(n)])
         };
-        let reaches = (0..nodes.div_ceil(SPAN)).into_par_iter().map(span).collect();
+        let reaches = (0..nodes.div_ceil(SPAN))
+            .into_par_iter()
+            .map(span)
+            .collect();
         let corners = Corners::of(&mesh);
         let mut model = Tet10 {
             lambda: young_mpa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
@@ -203,21 +208,39 @@ impl Coarsen for Tet10 {
         let spans = sites.start / SPAN..sites.end.div_ceil(SPAN);
         let range = self.reaches[spans]
             .iter()
-            .fold([u32::MAX, 0], |[a, b], [low, high]| [a.min(*low), b.max(*high)]);
+            .fold([u32::MAX, 0], |[a, b], [low, high]| {
+                [a.min(*low), b.max(*high)]
+            });
         range[0] as usize..range[1] as usize + 1
     }
 
     fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         let moduli = [self.lambda, self.mu];
         self.each_part(sites, y, |elements, part, y| {
-            kernel::add(&self.mesh.elements, elements, moduli, |e| self.shape(e).unpacked(), x, part, y);
+            kernel::add(
+                &self.mesh.elements,
+                elements,
+                moduli,
+                |e| self.shape(e).unpacked(),
+                x,
+                part,
+                y,
+            );
         });
     }
 
     fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
         let moduli = [self.lambda as f32, self.mu as f32];
         self.each_part(sites, y, |elements, part, y| {
-            kernel::add(&self.mesh.elements, elements, moduli, |e| self.shapes[e], x, part, y);
+            kernel::add(
+                &self.mesh.elements,
+                elements,
+                moduli,
+                |e| self.shapes[e],
+                x,
+                part,
+                y,
+            );
         });
     }
 

@@ -35,7 +35,14 @@ impl Tet10 {
     pub fn strains(&self, e: usize, u: &[[f64; 3]]) -> Corners {
         self.slopes(e, u).map(|g| {
             let half = |p: usize, q: usize| 0.5 * (g[p][q] + g[q][p]);
-            [g[0][0], g[1][1], g[2][2], half(1, 2), half(0, 2), half(0, 1)]
+            [
+                g[0][0],
+                g[1][1],
+                g[2][2],
+                half(1, 2),
+                half(0, 2),
+                half(0, 1),
+            ]
         })
     }
 

@@ -1,11 +1,11 @@
 //! Owns the seam: what a solve needs of a three-dimensional discretisation of a specimen.
 
 use crate::error::Result;
-use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
 use crate::pipeline::apparent::fields::Recorded;
 use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::precondition::Precondition;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::result::settings::Settings;
@@ -52,7 +52,7 @@ pub trait Discretisation: Sized {
     fn system(
         &self,
         loads: LoadSet,
-    ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>>;
+    ) -> System<'_, impl MixedPrecision, impl Precondition, impl Functional<3>>;
 
     /// Apparent moduli of the displacements `u` in equilibrium under [`LoadSet::Compression`].
     fn assess(&self, u: &[[f64; 3]], info: &CgInfo) -> Moduli;
@@ -92,7 +92,7 @@ impl LoadSet {
 /// Equations of equilibrium, `A u = 0` on the unknowns that are not held.
 pub struct System<'a, O, C, G> {
     pub operator: &'a O,
-    /// What multigrid is built on: the operator, or the part of it that dominates.
+    /// What the preconditioner is built on: the operator, or the part of it that dominates.
     pub coarsen: C,
     pub multigrid: AmgParams,
     /// The quantity wanted, where it is not the energy.
@@ -147,6 +147,8 @@ pub enum Resolution {
     Refine(usize),
     /// Voxels per element along each axis: more take less.
     Coarsen(usize),
+    /// Edge of smooth elements in mm: a larger one takes less. 0: not known.
+    Element(f64),
 }
 
 /// Share of a scan's volume that is taken for bone before it is read: trabecular bone fills less, but lattices pad it

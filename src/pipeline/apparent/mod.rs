@@ -6,10 +6,12 @@
 pub mod discretisation;
 pub mod equilibrium;
 pub mod fields;
+pub mod geometry_fe;
 pub mod job;
 pub mod lattice;
 pub mod mechanisms;
 pub mod params;
+pub mod precondition;
 pub mod resolution;
 pub mod solved;
 pub mod stiffness;
@@ -17,6 +19,7 @@ pub mod tissue;
 pub mod voxel_fe;
 
 use crate::error::Result;
+use crate::pipeline::apparent::geometry_fe::GeometryModel;
 use crate::pipeline::apparent::job::Job;
 use crate::pipeline::apparent::lattice::connected::ConnectedModel;
 use crate::pipeline::apparent::lattice::sites::SiteModel;
@@ -33,6 +36,7 @@ pub fn jobs(lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {
     match params.method {
         Method::Lattice => lattices.cases().into_iter().map(of_lattice).collect(),
         Method::VoxelFe => vec![of_voxels()],
+        Method::GeometryFe => vec![of_geometry()],
     }
 }
 
@@ -47,6 +51,11 @@ pub fn of_lattice(case: Case) -> Job {
 /// The solve by one hexahedron per voxel, or finer or coarser ones.
 pub fn of_voxels() -> Job {
     Job::of::<VoxelModel>(())
+}
+
+/// The solve by ten-node tetrahedra inside the smooth surface.
+pub fn of_geometry() -> Job {
+    Job::of::<GeometryModel>(())
 }
 
 /// Solves one lattice of a specimen under one load.

@@ -52,6 +52,9 @@ pub struct SolveParams {
     /// voxel-fe: this many voxels along every axis become one element.
     pub coarsen: usize,
     pub coarsen_by: CoarsenBy,
+    /// geometry-fe: edge of the cells that elements are made in, in mm. None: from the struts' thickness.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub element_mm: Option<f64>,
     /// Count mechanisms, too; takes a factorisation.
     pub mechanisms: bool,
     /// Fields to write.
@@ -80,6 +83,7 @@ impl Default for SolveParams {
             smoothed_again: false,
             coarsen: 1,
             coarsen_by: CoarsenBy::default(),
+            element_mm: None,
             mechanisms: false,
             fields: Vec::new(),
             pistoia: None,
@@ -92,6 +96,7 @@ impl SolveParams {
     pub fn needs_grey(&self) -> bool {
         self.material.is_some()
             || self.smoothed_again
+            || self.method == Method::GeometryFe
             || (self.refine > 1 && !self.refine_mask)
             || (self.coarsen > 1 && self.coarsen_by == CoarsenBy::Threshold)
     }
@@ -181,6 +186,15 @@ impl SolveParams {
                 "solve.fields",
                 "the failure load and von Mises stresses come from voxel elements",
                 "add --method voxel-fe, or ask for --fields displacement,sed,fraction of a lattice",
+            ));
+        }
+        if let Some(size) = self.element_mm
+            && !(size > 0.0 && size.is_finite())
+        {
+            return Err(Error::setting(
+                "solve.element_mm",
+                format!("not usable: {size}"),
+                "give a size in mm above 0, or leave it out: it then follows from the struts",
             ));
         }
         if self.max_iterations == 0 {

@@ -9,7 +9,6 @@ use crate::discretisation::voxels::Planes;
 use crate::error::Result;
 use crate::mask::resample;
 use crate::measure::apparent::Loaded;
-use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision, Operator};
 use crate::par::sum_chunks;
 use crate::pipeline::apparent::discretisation::{
@@ -17,6 +16,7 @@ use crate::pipeline::apparent::discretisation::{
 };
 use crate::pipeline::apparent::fields::Recorded;
 use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::precondition::Precondition;
 use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
@@ -115,7 +115,7 @@ impl Discretisation for VoxelModel {
     fn system(
         &self,
         loads: LoadSet,
-    ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>> {
+    ) -> System<'_, impl MixedPrecision, impl Precondition, impl Functional<3>> {
         let (mesh, grips, params) = (self.bricks.mesh(), self.grips, &self.params);
         System {
             operator: &self.bricks,

@@ -77,6 +77,7 @@ pub fn record(
         fields,
         failure,
         surface,
+        note: None,
         sites: None,
     })
 }

@@ -1,11 +1,15 @@
 //! Owns what a two-level cycle needs of elements of higher order: the space of lower order inside theirs.
 
+use super::MixedPrecision;
 use super::coarsen::Coarsen;
 use super::held::Held;
 
 /// An operator with a coarser one whose displacements are among its own.
-pub trait Nested: Coarsen {
+pub trait Nested: MixedPrecision {
     type Coarse: Coarsen;
+
+    /// A bound of the largest eigenvalue of `D⁻¹A`, as [`Coarsen::eigenvalue_bound`].
+    fn eigenvalue_bound(&self) -> f64;
 
     fn coarse(&self) -> &Self::Coarse;
 

@@ -6,13 +6,14 @@
 
 use super::mesh::{Mesh, cross, dot, minus, volume};
 use super::pieces::Faces;
+use super::quality::{angles, beyond};
 use super::surface::Surface;
 use rayon::prelude::*;
 
 /// Part of a cell's edge that a vertex moves at most.
 const MOST: f64 = 0.1;
 
-/// Part of an element's volume that must be left.
+/// Part of an element's volume that must be left; its angles must stay within their bounds where they were.
 const LEAST_LEFT: f64 = 0.4;
 
 /// Fits free faces to the surface; those on the faces of the box stay in them.
@@ -69,8 +70,12 @@ pub fn fit(mesh: &mut Mesh, surface: &Surface) {
             .zip(before.par_iter().zip(&moves))
             .for_each(|(at, (from, by))| *at = [0, 1, 2].map(|a| from[a] + by[a]));
         let spoilt = |e: &&[u32; 4]| {
-            let was = volume(e.map(|v| before[v as usize]));
-            volume(mesh.corners(e)) < LEAST_LEFT * was
+            if e.iter().all(|v| moves[*v as usize] == [0.0; 3]) {
+                return false;
+            }
+            let was = e.map(|v| before[v as usize]);
+            let now = mesh.corners(e);
+            volume(now) < LEAST_LEFT * volume(was) || beyond(angles(now)) && !beyond(angles(was))
         };
         let spoilt: Vec<u32> = mesh
             .elements

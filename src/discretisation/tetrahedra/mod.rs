@@ -3,6 +3,7 @@
 //! A body-centred cubic lattice covers the box. Its vertices near the surface move onto it, the others' tetrahedra are cut
 //! where the surface crosses their edges. The box's faces are planes of the lattice, so that bone cut by them ends flat.
 
+pub mod fill;
 pub mod fit;
 pub mod lattice;
 pub mod mesh;

@@ -43,11 +43,16 @@ pub fn angles(corners: [[f64; 3]; 4]) -> [f64; 2] {
     range
 }
 
+/// Whether an angle is outside [`BOUNDS_DEGREES`].
+pub fn beyond([least, largest]: [f64; 2]) -> bool {
+    least < BOUNDS_DEGREES[0] || largest > BOUNDS_DEGREES[1]
+}
+
 pub fn quality(mesh: &Mesh) -> Quality {
     let of = |e: &[u32; 4]| {
         let corners = mesh.corners(e);
         let [least, largest] = angles(corners);
-        let outside = least < BOUNDS_DEGREES[0] || largest > BOUNDS_DEGREES[1];
+        let outside = beyond([least, largest]);
         let at_face = corners.iter().any(|p| mesh.faces_at(*p) != [0; 3]);
         Quality {
             least_degrees: least,

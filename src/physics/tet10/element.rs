@@ -86,50 +86,6 @@ fn product((k, c): (usize, f64), (l, d): (usize, f64)) -> f64 {
     16.0 * both + c + d + c * d
 }
 
-/// Row `node` of an element's stiffness by columns, in single precision.
-#[inline]
-pub fn row(shape: &[f32; 10], [lambda, mu]: [f32; 2], node: usize) -> [[[f32; 3]; 3]; 10] {
-    let [b, c, d] = [0, 1, 2].map(|i| [shape[3 * i], shape[3 * i + 1], shape[3 * i + 2]]);
-    let slopes = [[0, 1, 2].map(|i| -(b[i] + c[i] + d[i])), b, c, d];
-    let volume = shape[9];
-    // The coupling of corners i and j for a mean product of 1.
-    let coupling = |i: usize, j: usize, weight: f32| {
-        let (g, h) = (slopes[i], slopes[j]);
-        let both = mu * (g[0] * h[0] + g[1] * h[1] + g[2] * h[2]);
-        let mut k = [[0.0f32; 3]; 3];
-        for r in 0..3 {
-            for c in 0..3 {
-                k[r][c] = lambda * g[r] * h[c] + mu * g[c] * h[r];
-            }
-            k[r][r] += both;
-        }
-        k.map(|row| row.map(|v| volume * weight * v))
-    };
-    let add = |sum: &mut [[f32; 3]; 3], k: &[[f32; 3]; 3], weight: f32| {
-        let pairs = sum.as_flattened_mut().iter_mut().zip(k.as_flattened());
-        pairs.for_each(|(s, v)| *s += weight * v);
-    };
-    let mut row = [[[0.0; 3]; 3]; 10];
-    for (i, (k, c)) in terms(node) {
-        for j in 0..4 {
-            let block = coupling(i, j, 1.0);
-            // Corner j itself, then every edge that ends there.
-            let weight = product((k, c), (j, -1.0)) as f32;
-            add(&mut row[j], &block, weight);
-            for (edge, [p, q]) in EDGES.iter().enumerate() {
-                let other = match j {
-                    _ if j == *p => *q,
-                    _ if j == *q => *p,
-                    _ => continue,
-                };
-                let weight = product((k, c), (other, 0.0)) as f32;
-                add(&mut row[4 + edge], &block, weight);
-            }
-        }
-    }
-    row
-}
-
 /// Row `corner` of the four-node element with the same corners, by columns.
 pub fn linear_row(shape: &[f32; 10], [lambda, mu]: [f32; 2], corner: usize) -> [[[f32; 3]; 3]; 4] {
     let [b, c, d] = [0, 1, 2].map(|i| [shape[3 * i], shape[3 * i + 1], shape[3 * i + 2]]);

@@ -3,7 +3,7 @@
 use crate::discretisation::tetrahedra::nodes::{EDGES, Ten};
 use crate::simd::vec3::Precision;
 use crate::simd::{Isa, isa};
-use std::ops::{Add, Mul, Range, Sub};
+use std::ops::{Add, Mul, Sub};
 
 const LANES: usize = 8;
 
@@ -32,21 +32,21 @@ lanewise!(Mul, mul);
 
 type Vector<T> = [Wide<T>; 3];
 
-/// Adds to `y` the forces of `elements` on the nodes `nodes` under displacements `x`. `shape` gives slopes and volume.
+/// Adds to `y` the forces of `elements` on the nodes from `first` on under displacements `x`. `shape` gives slopes and volume.
 pub fn add<T: Precision>(
     mesh: &[Ten],
     elements: &[u32],
     moduli: [T; 2],
     shape: impl Fn(usize) -> [T; 10],
     x: &[[T; 3]],
-    nodes: Range<usize>,
+    first: usize,
     y: &mut [[T; 3]],
 ) {
     match isa() {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has what the function asks for.
-        Isa::Avx512 | Isa::Avx2 => unsafe { add_avx2(mesh, elements, moduli, shape, x, nodes, y) },
-        _ => add_lanes(mesh, elements, moduli, shape, x, nodes, y),
+        Isa::Avx512 | Isa::Avx2 => unsafe { add_avx2(mesh, elements, moduli, shape, x, first, y) },
+        _ => add_lanes(mesh, elements, moduli, shape, x, first, y),
     }
 }
 
@@ -58,10 +58,10 @@ fn add_avx2<T: Precision>(
     moduli: [T; 2],
     shape: impl Fn(usize) -> [T; 10],
     x: &[[T; 3]],
-    nodes: Range<usize>,
+    first: usize,
     y: &mut [[T; 3]],
 ) {
-    add_lanes(mesh, elements, moduli, shape, x, nodes, y);
+    add_lanes(mesh, elements, moduli, shape, x, first, y);
 }
 
 #[inline(always)]
@@ -71,7 +71,7 @@ fn add_lanes<T: Precision>(
     moduli: [T; 2],
     shape: impl Fn(usize) -> [T; 10],
     x: &[[T; 3]],
-    nodes: Range<usize>,
+    first: usize,
     y: &mut [[T; 3]],
 ) {
     let moduli = moduli.map(|m| Wide([m; LANES]));
@@ -93,7 +93,7 @@ fn add_lanes<T: Precision>(
         let forces = forces(&u, &shapes, moduli);
         for (l, e) in group.iter().enumerate() {
             for (n, f) in mesh[*e as usize].iter().zip(&forces) {
-                let at = (*n as usize).wrapping_sub(nodes.start);
+                let at = (*n as usize).wrapping_sub(first);
                 if let Some(y) = y.get_mut(at) {
                     (0..3).for_each(|c| y[c] = y[c] + f[c].0[l]);
                 }

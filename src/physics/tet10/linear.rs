@@ -101,6 +101,10 @@ const PART: usize = 4096;
 impl Nested for Tet10 {
     type Coarse = Assembled;
 
+    fn eigenvalue_bound(&self) -> f64 {
+        element::EIGENVALUE_BOUND
+    }
+
     fn coarse(&self) -> &Assembled {
         &self.linear
     }

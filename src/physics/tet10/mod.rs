@@ -10,19 +10,13 @@ mod linear;
 pub mod strain;
 
 use crate::discretisation::tetrahedra::nodes::TetMesh;
-use crate::operator::Operator;
 use crate::operator::assembled::Assembled;
-use crate::operator::coarsen::{Block, Coarsen, VisitRow};
+use crate::operator::{MixedPrecision, Operator};
+use crate::par::{CHUNK as BLOCK, each_chunk};
+use crate::simd::vec3::Precision;
 use element::Shape;
 use linear::Corners;
 use rayon::prelude::*;
-use std::ops::Range;
-
-/// Nodes per block: those of one call of the solver.
-const BLOCK: usize = 4096;
-
-/// Nodes whose columns' range is known.
-const SPAN: usize = 256;
 
 /// Isotropic bone, whose modulus may differ from element to element.
 pub struct Tet10 {
@@ -38,7 +32,6 @@ pub struct Tet10 {
     /// Elements around each node: `16 element + local node`, and where each node's begin.
     starts: Vec<u32>,
     around: Vec<u32>,
-    reaches: Vec<[u32; 2]>,
     corners: Corners,
     /// What the corners alone make, for multigrid.
     linear: Assembled,
@@ -78,18 +71,6 @@ impl Tet10 {
                 }
             }
         }
-        let span = |s: usize| {
-            let nodes = s * SPAN..((s + 1) * SPAN).min(nodes);
-            let of = starts[nodes.start] as usize..starts[nodes.end] as usize;
-            let columns = around[of]
-                .iter()
-                .flat_map(|a| mesh.elements[*a as usize / 16]);
-            columns.fold([u32::MAX, 0], |[low, high], n| [low.min(n), high.max(n)])
-        };
-        let reaches = (0..nodes.div_ceil(SPAN))
-            .into_par_iter()
-            .map(span)
-            .collect();
         let corners = Corners::of(&mesh);
         let mut model = Tet10 {
             lambda: young_mpa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
@@ -99,7 +80,6 @@ impl Tet10 {
             blocks,
             starts,
             around,
-            reaches,
             linear: Assembled::of_rows(Vec::new(), 0.0, |_, _, _| ()),
             corners: Corners::of(&TetMesh::default()),
             mesh,
@@ -107,12 +87,6 @@ impl Tet10 {
         model.linear = linear::assemble(&model, &corners);
         model.corners = corners;
         model
-    }
-
-    /// Mean number of blocks of nodes that an element stands about.
-    pub fn repeats(&self) -> f64 {
-        let all: usize = self.blocks.iter().map(Vec::len).sum();
-        all as f64 / self.mesh.elements.len() as f64
     }
 
     pub fn nodes(&self) -> usize {
@@ -154,7 +128,7 @@ impl Operator<3> for Tet10 {
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         y.par_chunks_mut(BLOCK).enumerate().for_each(|(b, y)| {
-            self.rows_f64(b * BLOCK..b * BLOCK + y.len(), x, y);
+            self.forces_f64(b * BLOCK, x, y);
         });
     }
 
@@ -170,102 +144,53 @@ impl Operator<3> for Tet10 {
     }
 }
 
-impl Coarsen for Tet10 {
-    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
-        x.copy_from_slice(&self.mesh.nodes_mm[sites]);
-    }
-
-    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
-        let reach = self.reach(sites.clone());
-        let mut places = vec![0u64; reach.len()];
-        let (mut columns, mut blocks) = (Vec::<u32>::new(), Vec::<Block>::new());
+impl MixedPrecision for Tet10 {
+    fn apply_single(
+        &self,
+        x: &[[f32; 3]],
+        y: &mut [[f32; 3]],
+        finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
+    ) -> f64 {
         let moduli = [self.lambda as f32, self.mu as f32];
-        for (k, node) in sites.enumerate() {
-            let stamp = (k as u64 + 1) << 32;
-            columns.clear();
-            blocks.clear();
-            for a in self.around(node) {
-                let (e, local) = (*a as usize / 16, *a as usize % 16);
-                let row = element::row(&self.shapes[e], moduli, local);
-                for (n, block) in self.mesh.elements[e].iter().zip(&row) {
-                    let place = &mut places[*n as usize - reach.start];
-                    if *place >> 32 == stamp >> 32 {
-                        let sum = &mut blocks[(*place & 0xffff_ffff) as usize];
-                        let pairs = sum.as_flattened_mut().iter_mut().zip(block.as_flattened());
-                        pairs.for_each(|(s, b)| *s += b);
-                    } else {
-                        *place = stamp | blocks.len() as u64;
-                        columns.push(*n);
-                        blocks.push(*block);
-                    }
-                }
-            }
-            visit(node, &columns, &blocks);
-        }
-    }
-
-    fn reach(&self, sites: Range<usize>) -> Range<usize> {
-        let spans = sites.start / SPAN..sites.end.div_ceil(SPAN);
-        let range = self.reaches[spans]
-            .iter()
-            .fold([u32::MAX, 0], |[a, b], [low, high]| {
-                [a.min(*low), b.max(*high)]
-            });
-        range[0] as usize..range[1] as usize + 1
-    }
-
-    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        let moduli = [self.lambda, self.mu];
-        self.each_part(sites, y, |elements, part, y| {
-            kernel::add(
-                &self.mesh.elements,
-                elements,
-                moduli,
-                |e| self.shape(e).unpacked(),
-                x,
-                part,
-                y,
-            );
+        let shape = |e: usize| self.shapes[e];
+        let [sum] = each_chunk(y, BLOCK, |first, y| {
+            self.forces(moduli, shape, first, x, y);
+            [finish(first, y)]
         });
+        sum
     }
 
-    fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
-        let moduli = [self.lambda as f32, self.mu as f32];
-        self.each_part(sites, y, |elements, part, y| {
-            kernel::add(
-                &self.mesh.elements,
-                elements,
-                moduli,
-                |e| self.shapes[e],
-                x,
-                part,
-                y,
-            );
-        });
-    }
-
-    /// Measured: see [`element::EIGENVALUE_BOUND`].
-    fn eigenvalue_bound(&self) -> f64 {
-        element::EIGENVALUE_BOUND
+    fn for_each_chunk(
+        &self,
+        x: &[[f64; 3]],
+        out: &mut [[f32; 3]],
+        consume: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        each_chunk(out, BLOCK, |first, out| {
+            let mut image = vec![[0.0; 3]; out.len()];
+            self.forces_f64(first, x, &mut image);
+            consume(first, &image, out)
+        })
     }
 }
 
 impl Tet10 {
-    /// Splits `sites` at blocks: `add` has a block's elements, the nodes and their part of `y`, which is zero.
-    fn each_part<T: Copy + Default>(
+    fn forces_f64(&self, first: usize, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        let shape = |e: usize| self.shape(e).unpacked();
+        self.forces([self.lambda, self.mu], shape, first, x, y);
+    }
+
+    /// Forces on the block of nodes that begins with `first`.
+    fn forces<T: Precision>(
         &self,
-        sites: Range<usize>,
+        moduli: [T; 2],
+        shape: impl Fn(usize) -> [T; 10],
+        first: usize,
+        x: &[[T; 3]],
         y: &mut [[T; 3]],
-        add: impl Fn(&[u32], Range<usize>, &mut [[T; 3]]),
     ) {
         y.fill([T::default(); 3]);
-        let mut start = sites.start;
-        while start < sites.end {
-            let block = start / BLOCK;
-            let end = ((block + 1) * BLOCK).min(sites.end);
-            let part = &mut y[start - sites.start..end - sites.start];
-            add(&self.blocks[block], start..end, part);
-            start = end;
-        }
+        let elements = &self.blocks[first / BLOCK];
+        kernel::add(&self.mesh.elements, elements, moduli, shape, x, first, y);
     }
 }

@@ -2,8 +2,8 @@
 
 use super::supports::Grips;
 use super::{size, surface};
+use crate::discretisation::tetrahedra::fill::fill;
 use crate::discretisation::tetrahedra::lattice::Lattice;
-use crate::discretisation::tetrahedra::mesh;
 use crate::discretisation::tetrahedra::nodes::TetMesh;
 use crate::discretisation::tetrahedra::pieces::{self, Keep, Loaded};
 use crate::discretisation::tetrahedra::quality::{self, Quality};
@@ -38,7 +38,7 @@ pub fn of(
     let size_mm = size::of(specimen, params);
     let planes = surface::planes_mm(&specimen.bone.grid, size_mm, grips.axis, grips.low_mm);
     let lattice = Lattice::new(planes);
-    let mut all = mesh::fill(surface, &lattice)?;
+    let mut all = fill(surface, &lattice)?;
     let quality = quality::quality(&all);
     if quality.least_degrees <= 0.0 {
         return Err(Error::specimen(

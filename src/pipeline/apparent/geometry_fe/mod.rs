@@ -10,10 +10,11 @@ mod surface;
 use crate::discretisation::tetrahedra::surface::Surface;
 use crate::error::{Error, Result};
 use crate::measure::apparent::Loaded;
+use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision, Operator};
 use crate::physics::tet10::Tet10;
 use crate::pipeline::apparent::discretisation::{
-    Cost, Discretisation, Known, LoadSet, Prepared, System,
+    Cost, Discretisation, Displacements, Known, LoadSet, Prepared, System,
 };
 use crate::pipeline::apparent::fields::Recorded;
 use crate::pipeline::apparent::params::{Load, SolveParams};
@@ -35,7 +36,45 @@ pub struct GeometryModel {
     grips: Grips,
     loaded: Loaded,
     report: Report,
+    /// Of the mean element.
+    young_mpa: f64,
+    poisson: f64,
     params: SolveParams,
+}
+
+impl GeometryModel {
+    pub fn elements(&self) -> &Tet10 {
+        &self.model
+    }
+
+    /// Modulus for a factor of 1, in MPa.
+    pub fn young_mpa(&self) -> f64 {
+        self.young_mpa
+    }
+
+    pub fn poisson(&self) -> f64 {
+        self.poisson
+    }
+
+    /// What a compression holds, and the displacements of a homogeneous bar, in mm.
+    pub fn compression(&self) -> (Held, Displacements) {
+        let mesh = &self.model.mesh;
+        let displacement_mm = self.loaded.displacement_mm;
+        (
+            supports::held(mesh, &self.grips, &self.params),
+            supports::bar(mesh, &self.grips, displacement_mm),
+        )
+    }
+
+    pub fn gauge_and_displacement_mm(&self) -> [f64; 2] {
+        [self.loaded.gauge_mm, self.loaded.displacement_mm]
+    }
+
+    /// The grip that holds a place: the upper one if true.
+    pub fn grip_of(&self, at_mm: [f64; 3]) -> Option<bool> {
+        let upper = self.grips.is_upper(at_mm);
+        self.grips.is_gripped(at_mm).then_some(upper)
+    }
 }
 
 impl Discretisation for GeometryModel {
@@ -104,6 +143,8 @@ impl Discretisation for GeometryModel {
                 displacement_mm: params.strain * gauge_mm,
             },
             report,
+            young_mpa,
+            poisson,
             params: params.clone(),
         })
     }
@@ -123,7 +164,7 @@ impl Discretisation for GeometryModel {
             },
             goal: None::<NoGoal>,
             held: match loads {
-                LoadSet::Compression => supports::held(mesh, &self.grips, &self.params),
+                LoadSet::Compression => self.compression().0,
                 LoadSet::UnitStrains(numbers) => {
                     supports::held_faces(mesh, self.params.conditions, numbers[0])
                 }

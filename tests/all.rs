@@ -11,6 +11,7 @@ mod extension;
 mod fields;
 mod formats;
 mod fuzz;
+mod geometry_fe;
 mod hard;
 mod header_keys;
 mod header_property;

@@ -3,6 +3,10 @@
 
 mod plane;
 
+use bonepd_ct::discretisation::tetrahedra::fill::fill;
+use bonepd_ct::discretisation::tetrahedra::lattice::{Lattice as Cells, planes};
+use bonepd_ct::discretisation::tetrahedra::nodes::TetMesh;
+use bonepd_ct::discretisation::tetrahedra::surface::{Bound, Surface};
 use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::operator::coarsen::Coarsen;
@@ -15,6 +19,7 @@ use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
 use bonepd_ct::physics::lattice::connected::{ConnectedLattice, ConnectedSprings};
 use bonepd_ct::physics::lattice::multigrid::Springs;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
+use bonepd_ct::physics::tet10::Tet10;
 use bonepd_ct::pipeline::lattice::{
     Boundary, Case, Structure, build_connected, build_of, site_values,
 };
@@ -270,6 +275,83 @@ fn heterogeneous_row(kinds: &'static [(f64, Integration)]) -> Model {
     )
 }
 
+/// Smooth elements in the irregular specimen; their energy is summed over the points of a Gauss rule from the shape functions.
+fn tet10_row(poisson: f64, mixed: bool) -> Model {
+    let bone = irregular_specimen().bone;
+    let size = bone.grid.size_mm();
+    let values = bone.as_slice().iter().map(|v| f32::from(*v)).collect();
+    let surface = Surface::new(vec![Bound {
+        values: Volume::from_vec(bone.grid, values),
+        level: 0.5,
+        sign: 1.0,
+    }]);
+    let planes = std::array::from_fn(|a| planes(&[0.0, size[a]], 0.03));
+    let mesh = TetMesh::of(&fill(&surface, &Cells::new(planes)).unwrap());
+    assert!(mesh.elements.len() > 5000, "{}", mesh.elements.len());
+    let factor = |e: usize| if mixed { 0.5 + (e % 5) as f32 } else { 1.0 };
+    let factors: Vec<f32> = (0..mesh.elements.len()).map(factor).collect();
+    let (elements, positions) = (mesh.elements.clone(), mesh.nodes_mm.clone());
+    let own = mixed.then(|| factors.clone());
+    let operator = leaked(Tet10::new(mesh, 1000.0, poisson, own));
+    let nodes = positions.clone();
+    let energy = move |u: &[[f64; 3]]| {
+        let of = |(ten, factor): (&[u32; 10], &f32)| {
+            let at = |v: &[[f64; 3]]| ten.map(|n| v[n as usize]);
+            f64::from(*factor) * gauss_energy(at(&nodes), at(u), poisson)
+        };
+        elements.iter().zip(&factors).map(of).sum()
+    };
+    let name = format!("tet10 ν={poisson} mixed {mixed}");
+    Model::of(name, operator, positions, Box::new(energy))
+}
+
+/// Energy of a ten-node element of 1000 MPa by four points, from slopes of shape functions in the reference element.
+fn gauss_energy(at: [[f64; 3]; 10], u: [[f64; 3]; 10], poisson: f64) -> f64 {
+    let near = 0.585_410_196_624_968_5;
+    let far = 0.138_196_601_125_010_5;
+    let [lambda, mu] = [
+        1000.0 * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
+        500.0 / (1.0 + poisson),
+    ];
+    let point = |k: usize| {
+        let l: [f64; 4] = std::array::from_fn(|i| if i == k { near } else { far });
+        let of_l = |i: usize| match i {
+            0 => [-1.0; 3],
+            _ => std::array::from_fn(|a| if a + 1 == i { 1.0 } else { 0.0 }),
+        };
+        let slopes: [[f64; 3]; 10] = std::array::from_fn(|n| {
+            let (p, q) = (
+                [0, 1, 2, 3, 0, 1, 2, 0, 1, 2][n],
+                [0, 1, 2, 3, 1, 2, 0, 3, 3, 3][n],
+            );
+            std::array::from_fn(|a| match n {
+                0..4 => (4.0 * l[p] - 1.0) * of_l(p)[a],
+                _ => 4.0 * (l[p] * of_l(q)[a] + l[q] * of_l(p)[a]),
+            })
+        });
+        let by = |v: &[[f64; 3]; 10]| -> [[f64; 3]; 3] {
+            std::array::from_fn(|r| {
+                std::array::from_fn(|c| (0..10).map(|n| v[n][r] * slopes[n][c]).sum())
+            })
+        };
+        let (j, g) = (by(&at), by(&u));
+        let minor = |r: usize, c: usize| {
+            let (p, q, s, t) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
+            j[p][s] * j[q][t] - j[p][t] * j[q][s]
+        };
+        let determinant: f64 = (0..3).map(|c| j[0][c] * minor(0, c)).sum();
+        let entry = |r: usize, c: usize| -> f64 {
+            (0..3).map(|k| g[r][k] * minor(c, k) / determinant).sum()
+        };
+        let trace = entry(0, 0) + entry(1, 1) + entry(2, 2);
+        let squares: f64 = (0..9)
+            .map(|i| (0.5 * (entry(i / 3, i % 3) + entry(i % 3, i / 3))).powi(2))
+            .sum();
+        determinant / 24.0 * (0.5 * lambda * trace * trace + mu * squares)
+    };
+    (0..4).map(point).sum()
+}
+
 fn models() -> Vec<Model> {
     use Integration::{Full, MeanDilatation};
     let mut rows = vec![
@@ -301,6 +383,7 @@ fn models() -> Vec<Model> {
         }
     }
     rows.extend([0.0, 0.25, 0.3, 0.45].map(connected_row));
+    rows.extend([tet10_row(0.3, false), tet10_row(-0.2, true)]);
     rows
 }
 

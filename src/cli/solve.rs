@@ -4,13 +4,14 @@ use super::settings::{LatticeSettings, TissueSettings};
 use super::{print_json, words};
 use bonepd_ct::command::{Outcome, run_settings};
 use bonepd_ct::error::{Error, Result};
+use bonepd_ct::export::tetrahedra::Kind;
 use bonepd_ct::grid::Axis;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::apparent::checks::needs_modulus;
 use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Compress a segmented scan and compute its apparent modulus E_app
 ///
@@ -26,10 +27,11 @@ pub struct SolveArgs {
     lattice: LatticeSettings,
     /// Choose the resolution so that the stated error (solver, elements, shape) stays below this, as 3% or
     /// 0.03; exit 1 where it cannot be met
-    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "lp", "boundary", "structure"])]
+    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "element_mm", "lp", "boundary", "structure"])]
     error: Option<f64>,
-    /// voxel-fe: also write the model for another program: inp (CalculiX, Abaqus)
-    #[arg(long, value_name = "FORMAT", value_parser = ["inp"])]
+    /// Also write the model for another program: inp (voxel-fe, geometry-fe: CalculiX, Abaqus), stl (geometry-fe: the
+    /// surface), vtu (geometry-fe: the mesh, for ParaView)
+    #[arg(long, value_name = "FORMAT", value_parser = ["inp", "stl", "vtu"])]
     export: Option<String>,
     /// Of an exported model: different moduli at most; more are rounded to the means of as many bins
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
@@ -39,7 +41,8 @@ pub struct SolveArgs {
 #[derive(Args)]
 #[command(next_help_heading = "Solve")]
 pub struct SolveSettings {
-    /// lattice (the lattice element method), or voxel-fe (one hexahedron per bone voxel) [default: lattice]
+    /// lattice (the lattice element method), voxel-fe (one hexahedron per bone voxel), or geometry-fe (tetrahedra of ten
+    /// nodes inside the smooth surface of the bone) [default: lattice]
     #[arg(long, value_parser = words::choice::<Method>(Method::WORDS))]
     method: Option<Method>,
     #[command(flatten)]
@@ -87,6 +90,9 @@ pub struct SolveSettings {
     /// voxel-fe: one element per N³ voxels
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     coarsen: Option<u16>,
+    /// geometry-fe: edge of the cells that elements are made in [default: from the thickness of the struts]
+    #[arg(long, value_name = "MM", value_parser = words::positive)]
+    element_mm: Option<f64>,
     /// What becomes of N³ voxels: threshold (bone where at least half of them is), or fraction (the modulus times the bone
     /// fraction; less than 2 % bone is left out) [default: threshold]
     #[arg(long, value_name = "RULE", value_parser = words::choice::<CoarsenBy>(&["threshold", "fraction"]), requires = "coarsen")]
@@ -162,6 +168,7 @@ impl SolveSettings {
         };
         params.coarsen_by = self.coarsen_by.unwrap_or(params.coarsen_by);
         params.coarsen = self.coarsen.map_or(params.coarsen, usize::from);
+        params.element_mm = self.element_mm.or(params.element_mm);
         params.mechanisms |= self.mechanisms;
         if !self.fields.is_empty() {
             params.fields.clone_from(&self.fields);
@@ -204,8 +211,8 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     args.settings.apply(&mut params, args.error.is_some())?;
     let mut lattice = bonepd_ct::command::lattice::settings(&args.dir)?;
     args.lattice.apply(&mut lattice)?;
-    if args.export.is_some() {
-        bonepd_ct::command::solve::export_inp(&args.dir, &params, args.bins.into(), session)?;
+    if let Some(format) = &args.export {
+        export(&args.dir, format, &params, args.bins.into(), session)?;
     }
     let (rows, met) = match args.error {
         Some(target) => {
@@ -231,6 +238,28 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
             false => Outcome::Done,
         },
     )
+}
+
+fn export(
+    dir: &Path,
+    format: &str,
+    params: &SolveParams,
+    bins: usize,
+    session: &Session,
+) -> Result<()> {
+    use bonepd_ct::command::solve::{export_inp, export_smooth};
+    let smooth = params.method == Method::GeometryFe;
+    match format {
+        "inp" if !smooth => export_inp(dir, params, bins, session),
+        "inp" => export_smooth(dir, Kind::Inp, params, bins, session),
+        _ if !smooth => Err(Error::setting(
+            format!("--export {format}"),
+            "only smooth elements have such a file",
+            "add --method geometry-fe",
+        )),
+        "stl" => export_smooth(dir, Kind::Stl, params, bins, session),
+        _ => export_smooth(dir, Kind::Vtu, params, bins, session),
+    }
 }
 
 /// The settings that options are laid over: those of the run that the folder belongs to, else the defaults.

@@ -242,6 +242,10 @@ fn coarser(resolution: Resolution, factor: f64) -> String {
         Resolution::Refine(refine) => {
             format!("--refine {:.0}", (refine as f64 / by).floor().max(1.0))
         }
+        Resolution::Element(size_mm) if size_mm > 0.0 => {
+            format!("take elements of {:.3} mm: --element-mm", size_mm * by)
+        }
+        Resolution::Element(_) => "take larger elements: --element-mm".into(),
         Resolution::Coarsen(coarsen) => format!(
             "--coarsen {} (the modulus will be less exact), or use lattices",
             (coarsen as f64 * by).ceil()

@@ -6,6 +6,7 @@ use crate::command::lattice::binned;
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
 use crate::export::inp;
+use crate::export::tetrahedra::{self, Kind};
 use crate::io::atomic;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
@@ -398,6 +399,28 @@ pub fn export_inp(dir: &Path, params: &SolveParams, bins: usize, session: &Sessi
     Ok(())
 }
 
+/// Writes the smooth elements of the specimen in `dir` to `dir/geometry-fe.` and the kind's extension.
+///
+/// # Errors
+/// A load without such a model, an unwritable file.
+pub fn export_smooth(
+    dir: &Path,
+    kind: Kind,
+    params: &SolveParams,
+    bins: usize,
+    session: &Session,
+) -> Result<()> {
+    params.check()?;
+    let path = dir.join("geometry-fe").with_extension(kind.extension());
+    if session.dry_run {
+        session.say(format!("would write {}", path.display()));
+        return Ok(());
+    }
+    let worst = tetrahedra::write(&path, kind, &loaded(dir, params)?, params, bins)?;
+    session.say(binned(&path, worst));
+    Ok(())
+}
+
 /// Adds the specimen's morphometry to the row.
 fn mark(row: &mut Row, measured: Option<&Morphometry>) {
     let marks = &mut row.marks;
@@ -418,6 +441,9 @@ fn with_recorded(mut row: Row, recorded: &Recorded) -> Row {
             displacement_mm: f.failure_displacement_mm,
             strain: f.failure_strain,
         });
+    }
+    if let Some(note) = &recorded.note {
+        notes::add(&mut row.marks.note, note);
     }
     row
 }

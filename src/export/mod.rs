@@ -4,5 +4,6 @@ pub mod bins;
 pub mod inp;
 pub mod lammps;
 pub mod points;
+pub mod tetrahedra;
 pub mod vti;
 pub mod vtk;

@@ -2,8 +2,10 @@
 //!
 //! `D` is the number of unknowns per site: 1 for conduction, 2 and 3 for displacements, 3 in the plane with rotation.
 
+pub mod assembled;
 pub mod coarsen;
 pub mod held;
+pub mod nested;
 pub mod nonlinear;
 pub mod probe;
 pub mod reduction;

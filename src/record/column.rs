@@ -26,11 +26,11 @@ pub(super) const SCAN: Column = column(
     "",
     "name of the scan: of its file, its folder, or in the manifest",
 );
-pub(super) const METHOD: Column = column("method", "", "lattice or voxel-fe");
+pub(super) const METHOD: Column = column("method", "", "lattice, voxel-fe or geometry-fe");
 pub(super) const STRUCTURE: Column = column(
     "structure",
     "",
-    "sc, bcc, fcc (lattices) or hex8 (voxel elements)",
+    "sc, bcc, fcc (lattices), hex8 (voxel elements) or tet10 (smooth elements)",
 );
 pub(super) const BOUNDARY: Column = column(
     "boundary",
@@ -40,7 +40,7 @@ pub(super) const BOUNDARY: Column = column(
 pub(super) const LP: Column = column(
     "lp_mm",
     "mm",
-    "lattice parameter; of voxel-fe the element size",
+    "lattice parameter; of voxel-fe and geometry-fe the element size",
 );
 pub(super) const BV_TV: Column = column("bv_tv", "", "bone volume fraction, 0 to 1");
 pub(super) const YOUNG: Column = column(

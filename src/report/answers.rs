@@ -100,6 +100,7 @@ pub fn method_words(method: &str) -> &str {
         "floppy" => "floppy lattice",
         "firm" => "firm lattice",
         "voxel-fe" => "voxel FE",
+        "geometry-fe" => "geometry-based FE",
         "graded-extrapolated" => "graded lattices, extrapolated",
         "voxel-fe-extrapolated" => "voxel FE, extrapolated",
         other => other,
@@ -122,6 +123,9 @@ fn explained(method: &str) -> &'static str {
         }
         "voxel-fe" => {
             "hexahedral elements; ± holds what elements of this size and the image leave open about struts of this thickness"
+        }
+        "geometry-fe" => {
+            "tetrahedra of ten nodes inside the smooth surface of the bone; ± holds what elements of this size and the image leave open about struts of this thickness"
         }
         "graded-extrapolated" => {
             "the limit of such lattices (a site for every connected component of bone in a cell, or sites weighted by bone fraction) of several lattice parameters"

@@ -51,7 +51,7 @@ fn curves<'a>(
         families
             .iter()
             .map(|f| &f.structure)
-            .filter(|s| **s != CellType::Hex8),
+            .filter(|s| !matches!(s, CellType::Hex8 | CellType::Tet10)),
     );
     let conditions = distinct(families.iter().map(|f| &f.condition));
     let curve = |family: &Family| {

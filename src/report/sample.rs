@@ -122,7 +122,7 @@ fn by_method(rows: &[&Row]) -> Vec<Sample> {
     let lattices = distinct(
         methods
             .iter()
-            .filter(|(_, s)| *s != CellType::Hex8)
+            .filter(|(_, s)| !matches!(s, CellType::Hex8 | CellType::Tet10))
             .map(|(_, s)| s),
     )
     .len();
@@ -133,7 +133,7 @@ fn by_method(rows: &[&Row]) -> Vec<Sample> {
             let of_scan = rows.iter().filter(own).filter(|row| row.key.scan == **scan);
             case(of_scan.min_by(|a, b| a.key.lp_mm.total_cmp(&b.key.lp_mm))?)
         };
-        let prefix = match lattices > 1 && *structure != CellType::Hex8 {
+        let prefix = match lattices > 1 && !matches!(structure, CellType::Hex8 | CellType::Tet10) {
             true => format!("{} ", structure.name().to_uppercase()),
             false => String::new(),
         };

@@ -59,7 +59,7 @@ pub const NO_PATH: &str = "no path of bone";
 fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
     let exactness = match (row.key.method, row.key.boundary) {
         (_, Some(BoundaryRule::Extrapolated)) => 0,
-        (Method::VoxelFe, _) => 1,
+        (Method::VoxelFe | Method::GeometryFe, _) => 1,
         (_, Some(BoundaryRule::GRADED)) => 2,
         (_, Some(BoundaryRule::Ffb)) => 3,
         _ => 4,

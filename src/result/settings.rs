@@ -12,11 +12,12 @@ pub enum Method {
     #[default]
     Lattice,
     VoxelFe,
+    GeometryFe,
 }
 
 impl Method {
     /// The words of settings and results, in the order of the variants.
-    pub const WORDS: &[&str] = &["lattice", "voxel-fe"];
+    pub const WORDS: &[&str] = &["lattice", "voxel-fe", "geometry-fe"];
 
     pub fn name(self) -> &'static str {
         Method::WORDS[self as usize]
@@ -30,6 +31,8 @@ pub enum CellType {
     Lattice(Structure),
     /// Bricks of eight nodes.
     Hex8,
+    /// Tetrahedra of ten nodes.
+    Tet10,
 }
 
 impl CellType {
@@ -37,6 +40,7 @@ impl CellType {
         match self {
             CellType::Lattice(structure) => structure.name(),
             CellType::Hex8 => "hex8",
+            CellType::Tet10 => "tet10",
         }
     }
 }
@@ -153,7 +157,8 @@ words!(
         CellType::Lattice(Structure::Sc),
         CellType::Lattice(Structure::Bcc),
         CellType::Lattice(Structure::Fcc),
-        CellType::Hex8
+        CellType::Hex8,
+        CellType::Tet10
     ]
 );
 words!(
@@ -194,6 +199,10 @@ pub enum Elements {
     BlockMeans,
     /// Blocks of voxels, their moduli weighted by bone fraction.
     BoneFractions,
+    /// Inside the surface where interpolated grey values cross the threshold.
+    SmoothGrey,
+    /// Inside the surface of a smoothed mask.
+    SmoothMask,
 }
 
 /// All that a row follows from. Rows with equal settings are of the same solve.

@@ -42,9 +42,15 @@ pub trait Precision:
     /// With AVX2, where that can be had.
     type Fast: Vec3Lanes<S = Self>;
     type Plain: Vec3Lanes<S = Self>;
+    fn of(v: f64) -> Self;
 }
 
 impl Precision for f64 {
+    #[inline(always)]
+    fn of(v: f64) -> f64 {
+        v
+    }
+
     #[cfg(target_arch = "x86_64")]
     type Fast = Avx64;
     #[cfg(not(target_arch = "x86_64"))]
@@ -53,6 +59,11 @@ impl Precision for f64 {
 }
 
 impl Precision for f32 {
+    #[inline(always)]
+    fn of(v: f64) -> f32 {
+        v as f32
+    }
+
     #[cfg(target_arch = "x86_64")]
     type Fast = Avx32;
     #[cfg(not(target_arch = "x86_64"))]

@@ -79,6 +79,15 @@ impl SolveParams {
             pistoia.check()?;
         }
         check_recorded(self)?;
+        if let Some(size) = self.element_mm
+            && !(size > 0.0 && size.is_finite())
+        {
+            return Err(Error::setting(
+                "solve.element_mm",
+                format!("not usable: {size}"),
+                "give a size in mm above 0, or leave it out: it then follows from the struts",
+            ));
+        }
         if self.max_iterations == 0 {
             return Err(Error::setting(
                 "solve.max_iterations",

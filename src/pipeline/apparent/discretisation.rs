@@ -2,13 +2,13 @@
 
 use crate::error::Result;
 use crate::measure::apparent::EndWork;
-use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::reactions::End;
+use crate::pipeline::apparent::precondition::Precondition;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::result::settings::Settings;
@@ -54,7 +54,7 @@ pub trait Discretisation: Sized {
     fn system(
         &self,
         loads: LoadSet,
-    ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>>;
+    ) -> System<'_, impl MixedPrecision, impl Precondition, impl Functional<3>>;
 
     /// The sites at both ends and how they move.
     fn ends(&self) -> EndSites<'_>;
@@ -108,7 +108,7 @@ impl LoadSet {
 /// Equations of equilibrium, `A u = 0` on the unknowns that are not held.
 pub struct System<'a, O, C, G> {
     pub operator: &'a O,
-    /// What multigrid is built on: the operator, or the part of it that dominates.
+    /// What the preconditioner is built on: the operator, or the part of it that dominates.
     pub coarsen: C,
     pub multigrid: AmgParams,
     /// The quantity wanted, where it is not the energy.
@@ -163,6 +163,8 @@ pub enum Resolution {
     Refine(usize),
     /// Voxels per element along each axis: more take less.
     Coarsen(usize),
+    /// Edge of smooth elements in mm: a larger one takes less. 0: not known.
+    Element(f64),
 }
 
 /// Share of a scan's volume that is taken for bone before it is read: trabecular bone fills less, but lattices pad it

@@ -1,10 +1,9 @@
 //! Owns equilibrium: the one way in which every system of equations is solved.
 
-use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision};
 use crate::pipeline::apparent::discretisation::{Displacements, System};
 use crate::pipeline::apparent::params::{Conditions, Load, SolveParams};
-use crate::solver::amg::Amg;
+use crate::pipeline::apparent::precondition::Precondition;
 use crate::solver::cg::fallback::minimise_or_fall_back;
 use crate::solver::cg::{CgInfo, CgParams, CgStep};
 
@@ -13,14 +12,14 @@ pub type Observe<'a> = dyn FnMut(usize, CgStep) + 'a;
 
 /// Displacements in equilibrium under each of the `loads`, which share supports and so one preconditioner: conjugate
 /// gradients with multigrid, or with the diagonal where multigrid breaks down. Each load is solved when its item is taken.
-pub fn equilibrium<'a, O: MixedPrecision, C: Coarsen, G: Functional<3>>(
+pub fn equilibrium<'a, O: MixedPrecision, C: Precondition, G: Functional<3>>(
     system: &'a System<'_, O, C, G>,
     loads: &'a [usize],
     params: &SolveParams,
     observe: &'a mut Observe,
 ) -> impl Iterator<Item = (usize, Displacements, CgInfo)> {
     let cg = accuracy(params);
-    let multigrid = Amg::new(&system.coarsen, &system.held, &system.multigrid);
+    let multigrid = system.coarsen.precondition(&system.held, &system.multigrid);
     loads.iter().map(move |&load| {
         let mut u = (system.start)(load);
         let info = minimise_or_fall_back(

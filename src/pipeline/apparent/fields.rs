@@ -93,6 +93,8 @@ pub struct Recorded {
     pub failure: Option<FailureAt>,
     /// How the modulus answers to the surface; of voxel elements of one tissue.
     pub surface: Option<SurfaceEnergy>,
+    /// What a reader must know of the model.
+    pub note: Option<String>,
     /// At the sites of a lattice.
     pub sites: Option<SiteFields>,
     pub details: Details,

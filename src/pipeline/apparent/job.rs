@@ -2,7 +2,6 @@
 
 use crate::discretisation::voxels::{self, Planes};
 use crate::error::{Error, Result};
-use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision, Operator};
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, Prepared, System,
@@ -176,7 +175,7 @@ pub fn bone_connects(specimen: &Specimen, params: &SolveParams) -> bool {
     grips.is_ok_and(|grips| voxels::connects(bone.grid, bone.as_slice(), |b| *b != 0, grips))
 }
 
-fn count_mechanisms<O: MixedPrecision, C: Coarsen, G: Functional<3>>(
+fn count_mechanisms<O: MixedPrecision, C, G: Functional<3>>(
     system: &System<O, C, G>,
 ) -> Result<Option<usize>> {
     match &system.places {

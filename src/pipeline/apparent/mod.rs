@@ -7,11 +7,13 @@ pub mod checks;
 pub mod discretisation;
 pub mod equilibrium;
 pub mod fields;
+pub mod geometry_fe;
 pub mod job;
 pub mod lattice;
 pub mod mechanisms;
 pub mod motion;
 pub mod params;
+pub mod precondition;
 pub mod reactions;
 pub mod resolution;
 pub mod solved;
@@ -20,6 +22,7 @@ pub mod tissue;
 pub mod voxel_fe;
 
 use crate::error::Result;
+use crate::pipeline::apparent::geometry_fe::GeometryModel;
 use crate::pipeline::apparent::job::Job;
 use crate::pipeline::apparent::lattice::connected::ConnectedModel;
 use crate::pipeline::apparent::lattice::sites::SiteModel;
@@ -36,6 +39,7 @@ pub fn jobs(lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {
     match params.method {
         Method::Lattice => lattices.cases().into_iter().map(of_lattice).collect(),
         Method::VoxelFe => vec![of_voxels()],
+        Method::GeometryFe => vec![of_geometry()],
     }
 }
 
@@ -50,6 +54,11 @@ pub fn of_lattice(case: Case) -> Job {
 /// The solve by one hexahedron per voxel, or finer or coarser ones.
 pub fn of_voxels() -> Job {
     Job::of::<VoxelModel>(())
+}
+
+/// The solve by ten-node tetrahedra inside the smooth surface.
+pub fn of_geometry() -> Job {
+    Job::of::<GeometryModel>(())
 }
 
 /// Solves one lattice of a specimen under one load.

@@ -54,6 +54,9 @@ pub struct SolveParams {
     /// voxel-fe: this many voxels along every axis become one element.
     pub coarsen: usize,
     pub coarsen_by: CoarsenBy,
+    /// geometry-fe: edge of the cells that elements are made in, in mm. None: from the struts' thickness.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub element_mm: Option<f64>,
     /// Count mechanisms, too; takes a factorisation.
     pub mechanisms: bool,
     /// Fields to write.
@@ -89,6 +92,7 @@ impl Default for SolveParams {
             smoothed_again: false,
             coarsen: 1,
             coarsen_by: CoarsenBy::default(),
+            element_mm: None,
             mechanisms: false,
             fields: Vec::new(),
             pistoia: None,
@@ -104,6 +108,7 @@ impl SolveParams {
     pub fn needs_grey(&self) -> bool {
         self.material.is_some()
             || self.smoothed_again
+            || self.method == Method::GeometryFe
             || (self.refine > 1 && !self.refine_mask)
             || (self.coarsen > 1 && self.coarsen_by == CoarsenBy::Threshold)
             || self.needs_labels()

@@ -2,7 +2,6 @@
 
 use crate::error::{Error, Result};
 use crate::measure::apparent::EndWork;
-use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::connected::{ConnectedLattice, ConnectedSprings};
 use crate::pipeline::apparent::discretisation::{
@@ -14,6 +13,7 @@ use crate::pipeline::apparent::lattice::stress::Stress;
 use crate::pipeline::apparent::lattice::{Placed, cost, label, refuse_unit_strains};
 use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::precondition::Precondition;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::lattice::{Case, build_connected};
 use crate::result::settings::Settings;
@@ -92,7 +92,7 @@ impl Discretisation for ConnectedModel {
     fn system(
         &self,
         _: LoadSet,
-    ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>> {
+    ) -> System<'_, impl MixedPrecision, impl Precondition, impl Functional<3>> {
         self.placed().system(
             &self.lattice,
             ConnectedSprings(&self.lattice),

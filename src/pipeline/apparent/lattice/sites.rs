@@ -2,7 +2,6 @@
 
 use crate::error::Result;
 use crate::measure::apparent::EndWork;
-use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::Lattice;
 use crate::physics::lattice::multigrid::Springs;
@@ -15,6 +14,7 @@ use crate::pipeline::apparent::lattice::stress::Stress;
 use crate::pipeline::apparent::lattice::{Placed, cost, label, refuse_unit_strains};
 use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::precondition::Precondition;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::lattice::{Boundary, Case, build_of, site_values};
 use crate::result::settings::Settings;
@@ -109,7 +109,7 @@ impl Discretisation for SiteModel {
     fn system(
         &self,
         _: LoadSet,
-    ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>> {
+    ) -> System<'_, impl MixedPrecision, impl Precondition, impl Functional<3>> {
         let (placed, params) = (self.placed(), &self.params);
         let places = params.mechanisms.then(|| Places {
             at: placed.indices.to_vec(),

@@ -15,7 +15,6 @@ use crate::discretisation::voxels::Planes;
 use crate::error::Result;
 use crate::mask::resample;
 use crate::measure::apparent::EndWork;
-use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision};
 use crate::par::sum_chunks;
 use crate::pipeline::apparent::discretisation::{
@@ -23,7 +22,8 @@ use crate::pipeline::apparent::discretisation::{
 };
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::motion::EndMotion;
-use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::precondition::Precondition;
 use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
@@ -123,7 +123,7 @@ impl Discretisation for VoxelModel {
     fn system(
         &self,
         loads: LoadSet,
-    ) -> System<'_, impl MixedPrecision, impl Coarsen, impl Functional<3>> {
+    ) -> System<'_, impl MixedPrecision, impl Precondition, impl Functional<3>> {
         let (mesh, grips, motion) = (self.bricks.mesh(), self.grips, &self.motion);
         System {
             operator: &self.bricks,

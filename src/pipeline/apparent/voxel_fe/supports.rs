@@ -60,9 +60,9 @@ pub fn along(grips: Planes, plane: usize) -> f64 {
     (plane.clamp(grips.low, grips.high) - grips.low) as f64 / (grips.high - grips.low) as f64
 }
 
-/// The components of `u = ε x` that a load prescribes, and padding.
-pub fn held_faces(mesh: &VoxelMesh, conditions: Conditions, load: usize) -> Held {
-    let prescribed = |face: usize, component: usize| match (conditions, load) {
+/// Whether a unit strain prescribes a component of `u = ε x` on the faces across an axis.
+pub fn prescribed(conditions: Conditions, load: usize, face: usize, component: usize) -> bool {
+    match (conditions, load) {
         (Conditions::Kinematic, _) => true,
         (Conditions::Mixed, 0..3) => component == face,
         // Shear in the plane of p and q, out of it r: p's faces carry u_q and u_r, q's u_p and u_r, r's u_r.
@@ -73,12 +73,18 @@ pub fn held_faces(mesh: &VoxelMesh, conditions: Conditions, load: usize) -> Held
         (Conditions::Symshear, 0..3) => component == face,
         // p's and q's faces carry u_p and u_q, r's u_r.
         (Conditions::Symshear, _) => (component == load - 3) == (face == load - 3),
-    };
+    }
+}
+
+/// The components of `u = ε x` that a load prescribes, and padding.
+pub fn held_faces(mesh: &VoxelMesh, conditions: Conditions, load: usize) -> Held {
     let mut held = Held::none(mesh.len());
     each_node(mesh, |node, at| {
         let on = |face: &usize| at[*face] == 0 || at[*face] == mesh.grid.n[*face];
         for component in 0..3 {
-            let stopped = (0..3).filter(on).any(|face| prescribed(face, component));
+            let stopped = (0..3)
+                .filter(on)
+                .any(|face| prescribed(conditions, load, face, component));
             if mesh.around[node] == 0 || stopped {
                 held.hold(node, component);
             }

@@ -1,0 +1,124 @@
+//! Owns which elements share faces, which faces are free, and which connected pieces reach what they must.
+
+use super::mesh::{Corners, Mesh};
+use rayon::prelude::*;
+
+/// The three corners across from corner `c`, seen from outside in the order of a positive area.
+pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// A face of an element: four times the element, plus the corner across.
+pub type FaceId = u32;
+
+/// Pairs of elements that share a face, and faces of one element only.
+pub struct Faces {
+    pub shared: Vec<[u32; 2]>,
+    pub free: Vec<FaceId>,
+}
+
+impl Faces {
+    /// # Panics
+    /// At 2³⁰ elements or more.
+    pub fn of(elements: &[Corners]) -> Faces {
+        assert!(elements.len() < 1 << 30, "too many elements");
+        let face = |f: usize| {
+            let e = elements[f / 4];
+            let mut corners = FACES[f % 4].map(|c| e[c]);
+            corners.sort_unstable();
+            (corners, f as u32)
+        };
+        let mut faces: Vec<([u32; 3], u32)> =
+            (0..4 * elements.len()).into_par_iter().map(face).collect();
+        faces.par_sort_unstable();
+        let (mut shared, mut free) = (Vec::new(), Vec::new());
+        for group in faces.chunk_by(|a, b| a.0 == b.0) {
+            match group {
+                [(_, one)] => free.push(*one),
+                [(_, a), (_, b)] => shared.push([a / 4, b / 4]),
+                _ => unreachable!("a face has two sides"),
+            }
+        }
+        free.sort_unstable();
+        Faces { shared, free }
+    }
+
+    /// Corners of a free face, outwards.
+    pub fn corners(mesh: &Mesh, face: FaceId) -> [u32; 3] {
+        let e = mesh.elements[face as usize / 4];
+        FACES[face as usize % 4].map(|c| e[c])
+    }
+}
+
+/// The piece of every element (pieces are joined by faces), numbered in the order of their first elements, and how many there are.
+pub fn pieces(elements: usize, shared: &[[u32; 2]]) -> (Vec<u32>, usize) {
+    let mut parent: Vec<u32> = (0..elements as u32).collect();
+    for [a, b] in shared {
+        let (a, b) = (root(&mut parent, *a), root(&mut parent, *b));
+        parent[a.max(b) as usize] = a.min(b);
+    }
+    let mut count = 0;
+    let mut name = vec![0; elements];
+    for e in 0..elements {
+        let r = root(&mut parent, e as u32) as usize;
+        if r == e {
+            name[e] = count;
+            count += 1;
+        } else {
+            name[e] = name[r];
+        }
+    }
+    (name, count as usize)
+}
+
+fn root(parent: &mut [u32], mut e: u32) -> u32 {
+    while parent[e as usize] != e {
+        parent[e as usize] = parent[parent[e as usize] as usize];
+        e = parent[e as usize];
+    }
+    e
+}
+
+/// Which elements a load reaches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keep {
+    /// Pieces that touch both faces across an axis.
+    Between(usize),
+    /// Pieces that touch a face of the box.
+    AtFaces,
+}
+
+/// What was left out of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Loaded {
+    /// Pieces before and after.
+    pub pieces: usize,
+    pub kept: usize,
+    pub dropped_elements: usize,
+}
+
+/// Keeps the pieces that carry load.
+pub fn keep(mesh: &mut Mesh, keep: Keep) -> Loaded {
+    let faces = Faces::of(&mesh.elements);
+    let (piece, count) = pieces(mesh.elements.len(), &faces.shared);
+    let mut touched = vec![0u8; count];
+    for face in &faces.free {
+        let corners = Faces::corners(mesh, *face);
+        let on = corners.map(|v| mesh.faces_at(mesh.vertices_mm[v as usize]));
+        for a in 0..3 {
+            // All three corners: bone that meets a face in an edge is not held there.
+            let all = on.iter().fold(3, |all, v| all & v[a]);
+            let bits = match keep {
+                Keep::Between(axis) if a == axis => all,
+                Keep::Between(_) => 0,
+                Keep::AtFaces => 3 * u8::from(all != 0),
+            };
+            touched[piece[*face as usize / 4] as usize] |= bits;
+        }
+    }
+    let before = mesh.elements.len();
+    mesh.retain(|e| touched[piece[e] as usize] == 3);
+    Loaded {
+        pieces: count,
+        kept: touched.iter().filter(|t| **t == 3).count(),
+        dropped_elements: before - mesh.elements.len(),
+    }
+}

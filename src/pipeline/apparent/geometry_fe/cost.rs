@@ -1,0 +1,56 @@
+//! Owns how much memory and time smooth elements take, from the volume of bone.
+
+use super::size;
+use crate::pipeline::apparent::discretisation::{ASSUMED_BONE, Cost, Known, Prepared, Resolution};
+use crate::pipeline::apparent::params::SolveParams;
+
+/// Elements per cell inside bone.
+const PER_CELL: f64 = 12.0;
+
+/// Elements more that the surface takes, per cell's edge over the thickness `2 BV / BS`.
+const AT_SURFACE: f64 = 0.6;
+
+/// Bytes per element at the highest and per vertex of the lattice, seconds per element on two cores.
+const BYTES: f64 = 620.0;
+const BYTES_PER_VERTEX: f64 = 9.0;
+const S_PER_ELEMENT: f64 = 1.0e-5;
+
+/// Edge of a cell in voxels where nothing but the header is known.
+const ASSUMED_VOXELS: f64 = 2.0;
+
+/// What a solve takes.
+pub fn of(params: &SolveParams, known: Known) -> Cost {
+    match known {
+        Known::Header { voxels, volume_mm3 } => {
+            let cell = match (params.element_mm, volume_mm3) {
+                (Some(size), Some(volume)) => size.powi(3) * voxels / volume,
+                _ => ASSUMED_VOXELS.powi(3),
+            };
+            let elements = PER_CELL * 1.5 * ASSUMED_BONE * voxels / cell;
+            cost(
+                elements,
+                2.0 * voxels / cell,
+                params.element_mm.unwrap_or(0.0),
+            )
+        }
+        Known::Volume(prepared) | Known::Bone(prepared) => of_bone(params, prepared),
+    }
+}
+
+fn of_bone(params: &SolveParams, Prepared { specimen, .. }: Prepared) -> Cost {
+    let size_mm = size::of(specimen, params);
+    let cells = specimen.bv_mm3() / size_mm.powi(3);
+    let thickness = crate::measure::thickness::plate_thickness_mm(&specimen.bone);
+    let at_surface = thickness.map_or(0.0, |t| AT_SURFACE * size_mm / t);
+    let volume = specimen.bone.grid.size_mm().iter().product::<f64>();
+    let vertices = 2.0 * volume / size_mm.powi(3);
+    cost(PER_CELL * cells * (1.0 + at_surface), vertices, size_mm)
+}
+
+fn cost(elements: f64, vertices: f64, size_mm: f64) -> Cost {
+    Cost {
+        bytes: [elements * BYTES + vertices * BYTES_PER_VERTEX; 2],
+        time_s: Some(elements * S_PER_ELEMENT),
+        resolution: Resolution::Element(size_mm),
+    }
+}

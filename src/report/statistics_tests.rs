@@ -52,6 +52,7 @@ pub(in super::super) mod cases {
         let structure = match method {
             Method::Lattice => CellType::default(),
             Method::VoxelFe => CellType::Hex8,
+            Method::GeometryFe => CellType::Tet10,
         };
         for scan in distinct(rows.iter().map(|row| row.key.scan.clone())) {
             let first = rows

@@ -4,7 +4,7 @@
 
 use crate::operator::held::Held;
 use crate::operator::nested::Nested;
-use crate::operator::{MixedPrecision, Operator, SinglePreconditioner};
+use crate::operator::{Operator, SinglePreconditioner};
 use crate::par::CHUNK;
 use crate::solver::amg::{Amg, AmgParams};
 use rayon::prelude::*;

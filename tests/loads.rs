@@ -57,13 +57,13 @@ fn compliance(load: Load, across: usize, length: usize) -> f64 {
     }
 }
 
-/// The closed form, twice and thrice refined: errors fall by four each time (second order), and the finest is near.
+/// The closed form, twice refined: errors fall by four each time (second order), and the finest is near. With two elements
+/// across, a bar is not yet where the order shows.
 fn assert_second_order(found: [f64; 3], exact: f64, nearest: f64) {
     let errors = found.map(|f| (f / exact - 1.0).abs());
-    for pair in errors.windows(2) {
-        let order = (pair[0] / pair[1]).log2();
-        assert!((1.7..2.4).contains(&order), "{errors:?}: order {order}");
-    }
+    let [first, last] = [0, 1].map(|i| (errors[i] / errors[i + 1]).log2());
+    assert!((1.5..2.5).contains(&first), "{errors:?}: order {first}");
+    assert!((1.8..2.2).contains(&last), "{errors:?}: order {last}");
     assert!(errors[2] < nearest, "{errors:?}");
 }
 
@@ -235,8 +235,12 @@ fn lattices_balance_too() {
             let what = format!("{structure:?} {boundary:?} {load:?}");
             let ends = &recorded.details.ends;
             assert_balance(ends, &what);
-            // Firm: the modulus is that of the whole sites, padded ones carry force too.
-            if !(load == Load::Uniaxial && boundary == Boundary::Firm) {
+            // Firm: the modulus is that of the whole sites, padded ones carry force too. BCC: two planes are held at each end,
+            // and sideways forces on the outer one have an arm but do no work.
+            let is_firm = load == Load::Uniaxial && boundary == Boundary::Firm;
+            let has_arm =
+                structure == Structure::Bcc && load.is_by_angle() && load != Load::Torsion;
+            if !is_firm && !has_arm {
                 let energy = solved.work.force_n.or(solved.work.moment_nmm).unwrap();
                 let reaction = worked(ends, &params);
                 assert!(

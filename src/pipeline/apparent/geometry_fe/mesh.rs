@@ -10,7 +10,7 @@ use crate::discretisation::tetrahedra::quality::{self, Quality};
 use crate::discretisation::tetrahedra::surface::Surface;
 use crate::error::{Error, Result};
 use crate::measure::morphometry;
-use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::params::SolveParams;
 use crate::volume::Specimen;
 use rayon::prelude::*;
 
@@ -47,9 +47,9 @@ pub fn of(
         ));
     }
     let euler = [quality::euler(&all), morphometry::euler(&specimen.bone)];
-    let keep = match params.load {
-        Load::Stiffness => Keep::AtFaces,
-        Load::Uniaxial | Load::Confined => Keep::Between(grips.axis),
+    let keep = match params.load.motion() {
+        None => Keep::AtFaces,
+        Some(_) => Keep::Between(grips.axis),
     };
     let loaded = pieces::keep(&mut all, keep);
     let report = Report {

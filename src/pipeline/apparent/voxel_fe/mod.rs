@@ -22,7 +22,7 @@ use crate::pipeline::apparent::discretisation::{
 };
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::motion::EndMotion;
-use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::precondition::Precondition;
 use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::solved::Moduli;

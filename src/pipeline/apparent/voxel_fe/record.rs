@@ -78,6 +78,7 @@ impl<'a> Recorder<'a> {
             fields: self.fields(scan),
             failure: table.iter().find(own).cloned(),
             surface: self.is_uniform.then(|| self.surface()).flatten(),
+            note: None,
             sites: None,
             details: Details {
                 failure: table,

@@ -8,6 +8,7 @@ mod cohort;
 mod dicom_series;
 mod exports;
 mod extension;
+mod families;
 mod fields;
 mod formats;
 mod fuzz;

@@ -24,6 +24,14 @@ pub trait Coarsen: Operator<3> {
     /// among them: the columns' sites, and as many blocks. A site with an empty row (padding) is left out of everything.
     fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>);
 
+    /// Calls `visit` with every site of the range, in order, and the diagonal block of its row, zero where that is empty.
+    fn each_diagonal(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &Block)) {
+        self.each_row(sites, &mut |site, columns, blocks| {
+            let own = columns.iter().position(|&j| j as usize == site);
+            visit(site, own.map_or(&[[0.0; 3]; 3], |k| &blocks[k]));
+        });
+    }
+
     /// A range that holds every column of these rows. Need not be tight.
     fn reach(&self, sites: Range<usize>) -> Range<usize>;
 
@@ -55,6 +63,10 @@ impl<O: Coarsen> Coarsen for &O {
 
     fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
         (**self).each_row(sites, visit);
+    }
+
+    fn each_diagonal(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &Block)) {
+        (**self).each_diagonal(sites, visit);
     }
 
     fn reach(&self, sites: Range<usize>) -> Range<usize> {

@@ -238,6 +238,21 @@ impl Coarsen for Heterogeneous {
         }
     }
 
+    fn each_diagonal(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &Block)) {
+        for segment in self.mesh.segments_in(sites) {
+            for (i, node) in segment.nodes().enumerate() {
+                let mut sum = [[0.0; 3]; 3];
+                for (bit, factor, kind) in self.around(self.mesh.around[node], &segment.rows, i) {
+                    let own = self.stencils[kind].own(bit);
+                    for a in 0..3 {
+                        (0..3).for_each(|b| sum[a][b] += factor * own[a][b]);
+                    }
+                }
+                visit(node, &sum);
+            }
+        }
+    }
+
     fn reach(&self, sites: Range<usize>) -> Range<usize> {
         self.mesh.reach(sites)
     }

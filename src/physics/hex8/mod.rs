@@ -99,6 +99,13 @@ impl Coarsen for Hex8 {
         }
     }
 
+    fn each_diagonal(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &Block)) {
+        let around = &self.mesh.around[sites.clone()];
+        sites
+            .zip(around)
+            .for_each(|(node, &around)| visit(node, &self.stencils.own(around)));
+    }
+
     fn reach(&self, sites: Range<usize>) -> Range<usize> {
         self.mesh.reach(sites)
     }

@@ -25,6 +25,11 @@ impl Stencils {
         self.table[around as usize][neighbour].map(|row| row.map(|v| v as f32))
     }
 
+    /// The node's own block.
+    pub fn own(&self, around: u8) -> Block {
+        self.block(around, 13)
+    }
+
     /// The diagonal of the node's own block.
     pub fn diagonal(&self, around: u8) -> [f64; 3] {
         let own = &self.table[around as usize][13];

@@ -12,8 +12,12 @@ pub type Symmetric = [f32; 6];
 pub type Pair = [Symmetric; 2];
 
 pub enum Diagonal {
-    /// The distinct blocks, inverse and not, and each site's.
-    Few { kinds: Vec<Pair>, of: Vec<u16> },
+    /// The distinct blocks, inverse and not, their stiffness, and each site's.
+    Few {
+        kinds: Vec<Pair>,
+        stiffness: Vec<f32>,
+        of: Vec<u16>,
+    },
     /// An inverse block a site.
     Each(Vec<Symmetric>),
 }
@@ -65,7 +69,15 @@ impl Diagonal {
         for ((_, places), names) in chunks.iter().zip(&renamed) {
             of.extend(places.iter().map(|&p| names[p as usize]));
         }
-        Some(Diagonal::Few { kinds, of })
+        let stiffness = kinds
+            .iter()
+            .map(|[inverse, _]| stiffness(inverse))
+            .collect();
+        Some(Diagonal::Few {
+            kinds,
+            stiffness,
+            of,
+        })
     }
 
     pub fn sites(&self) -> usize {
@@ -77,7 +89,7 @@ impl Diagonal {
 
     pub fn bytes(&self) -> usize {
         match self {
-            Diagonal::Few { kinds, of } => 48 * kinds.len() + 2 * of.len(),
+            Diagonal::Few { kinds, of, .. } => 52 * kinds.len() + 2 * of.len(),
             Diagonal::Each(all) => 24 * all.len(),
         }
     }
@@ -85,7 +97,7 @@ impl Diagonal {
     #[inline]
     fn inverse(&self, site: usize) -> &Symmetric {
         match self {
-            Diagonal::Few { kinds, of } => &kinds[of[site] as usize][0],
+            Diagonal::Few { kinds, of, .. } => &kinds[of[site] as usize][0],
             Diagonal::Each(all) => &all[site],
         }
     }
@@ -100,24 +112,35 @@ impl Diagonal {
     #[inline]
     pub fn unscale(&self, site: usize, t: &[f32; 3]) -> Option<[f32; 3]> {
         match self {
-            Diagonal::Few { kinds, of } => Some(times(&kinds[of[site] as usize][1], t)),
+            Diagonal::Few { kinds, of, .. } => Some(times(&kinds[of[site] as usize][1], t)),
             Diagonal::Each(_) => None,
         }
     }
 
     /// Roughly the mean of the diagonal on the free components.
     pub fn stiffness(&self, site: usize) -> f32 {
-        let free: f32 = self.free(site).iter().sum();
-        let trace: f32 = self.inverse(site)[..3].iter().sum();
-        if free > 0.0 { free / trace } else { 0.0 }
+        match self {
+            Diagonal::Few { stiffness, of, .. } => stiffness[of[site] as usize],
+            Diagonal::Each(all) => stiffness(&all[site]),
+        }
     }
 
     /// 1 where a component is free, 0 where it is held or has no stiffness.
     #[inline]
     pub fn free(&self, site: usize) -> [f32; 3] {
-        let d = self.inverse(site);
-        [0, 1, 2].map(|c| if d[c] > 0.0 { 1.0 } else { 0.0 })
+        free(self.inverse(site))
     }
+}
+
+fn free(inverse: &Symmetric) -> [f32; 3] {
+    [0, 1, 2].map(|c| if inverse[c] > 0.0 { 1.0 } else { 0.0 })
+}
+
+/// Roughly the mean of the diagonal on the free components.
+fn stiffness(inverse: &Symmetric) -> f32 {
+    let free: f32 = free(inverse).iter().sum();
+    let trace: f32 = inverse[..3].iter().sum();
+    if free > 0.0 { free / trace } else { 0.0 }
 }
 
 /// Kinds up to which the kind of a site takes two bytes: their table should stay in the cache.
@@ -178,9 +201,8 @@ fn pair(block: &Block, held: u8) -> Pair {
 
 /// Calls `visit` with the pair of each site `start..start + held.len()`; zero without a row.
 fn each_pair(operator: &impl Coarsen, start: usize, held: &[u8], mut visit: impl FnMut(Pair)) {
-    operator.each_row(start..start + held.len(), &mut |site, columns, blocks| {
-        let own = columns.iter().position(|&j| j as usize == site);
-        visit(own.map_or([[0.0; 6]; 2], |k| pair(&blocks[k], held[site - start])));
+    operator.each_diagonal(start..start + held.len(), &mut |site, block| {
+        visit(pair(block, held[site - start]));
     });
 }
 
@@ -188,11 +210,21 @@ fn each_pair(operator: &impl Coarsen, start: usize, held: &[u8], mut visit: impl
 fn distinct(operator: &impl Coarsen, start: usize, held: &[u8]) -> (Vec<Pair>, Vec<u16>) {
     let mut known: HashMap<[u32; 6], u16> = HashMap::new();
     let (mut kinds, mut of) = (Vec::new(), Vec::with_capacity(held.len()));
-    each_pair(operator, start, held, |pair| {
-        let kind = *known.entry(pair[0].map(f32::to_bits)).or_insert_with(|| {
-            kinds.push(pair);
-            kinds.len() as u16 - 1
-        });
+    // Most sites are as the one before.
+    let mut last = None;
+    operator.each_diagonal(start..start + held.len(), &mut |site, block| {
+        let key = (*block, held[site - start]);
+        let kind = match last {
+            Some((before, kind)) if before == key => kind,
+            _ => {
+                let pair = pair(block, key.1);
+                *known.entry(pair[0].map(f32::to_bits)).or_insert_with(|| {
+                    kinds.push(pair);
+                    kinds.len() as u16 - 1
+                })
+            }
+        };
+        last = Some((key, kind));
         of.push(kind);
     });
     (kinds, of)

@@ -95,11 +95,14 @@ unsafe fn part_lanes<N: Lanes<S = f32>, const D: usize>(
                 continue;
             }
             image.clear();
+            // Blocks left of the diagonal are not kept.
+            let least = own.iter().map(|e| e.aggregate).fold(u32::MAX, u32::min);
             for (j, block) in rows.row(k) {
-                for entry in prolongator.row(j as usize) {
+                let entries = prolongator.row(j as usize).iter();
+                for entry in entries.filter(|e| e.aggregate >= least) {
                     let slot = find(&mut image, 0, entry.aggregate);
                     // SAFETY: the caller's.
-                    unsafe { add_product::<N, D>(&mut slot.block, block, &entry.block) };
+                    unsafe { add_product::<N, D>(&mut slot.block, &block, &entry.block) };
                 }
             }
             for left in own {

@@ -88,10 +88,11 @@ impl<const D: usize> Rows<D> {
 
     /// The row of the `i`th site that was read.
     #[inline(always)]
-    pub fn row(&self, i: usize) -> impl Iterator<Item = (u32, &[[f32; D]; D])> {
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (u32, [[f32; D]; D])> {
         let range = self.starts[i] as usize..self.starts[i + 1] as usize;
         let columns = self.columns[range.clone()].iter().copied();
-        columns.zip(&self.blocks[range])
+        // By value, so that blocks stay in registers.
+        columns.zip(self.blocks[range].iter().copied())
     }
 }
 
@@ -165,12 +166,12 @@ impl<'l, const D: usize, L: Level<D>> Prolongator<'l, L, D> {
 /// # Safety
 /// The instruction set of `N` is there.
 #[inline(always)]
-unsafe fn append_row<'r, N: Lanes<S = f32>, L: Level<D>, const D: usize>(
+unsafe fn append_row<N: Lanes<S = f32>, L: Level<D>, const D: usize>(
     level: &L,
     omega: f32,
     modes: &Window<Modes<D>>,
     i: usize,
-    row: impl Iterator<Item = (u32, &'r [[f32; D]; D])>,
+    row: impl Iterator<Item = (u32, [[f32; D]; D])>,
     entries: &mut Vec<Entry<D>>,
 ) {
     let aggregates = level.aggregates();
@@ -184,7 +185,7 @@ unsafe fn append_row<'r, N: Lanes<S = f32>, L: Level<D>, const D: usize>(
         if aggregate != NONE {
             let slot = find(entries, first, aggregate);
             // SAFETY: the caller's.
-            unsafe { add_product::<N, D>(&mut slot.block, block, &modes.of(j as usize)[0]) };
+            unsafe { add_product::<N, D>(&mut slot.block, &block, &modes.of(j as usize)[0]) };
         }
     }
     for entry in &mut entries[first..] {

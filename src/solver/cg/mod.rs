@@ -3,6 +3,7 @@
 pub mod error;
 pub mod fallback;
 pub mod jacobi;
+pub mod kept;
 pub mod mixed;
 pub mod widened;
 

@@ -210,6 +210,13 @@ impl Coarsen for Bricks {
         }
     }
 
+    fn each_diagonal(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &Block)) {
+        match self {
+            Bricks::Homogeneous(model) => model.each_diagonal(sites, visit),
+            Bricks::Heterogeneous(model) => model.each_diagonal(sites, visit),
+        }
+    }
+
     fn reach(&self, sites: Range<usize>) -> Range<usize> {
         self.mesh().reach(sites)
     }

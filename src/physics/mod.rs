@@ -8,3 +8,4 @@ pub mod hex8;
 pub mod hyperelastic;
 pub mod lattice;
 pub mod material;
+pub mod plasticity;

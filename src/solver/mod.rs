@@ -6,4 +6,5 @@ pub mod cg;
 pub mod chord;
 pub mod direct;
 pub mod lanczos;
+pub mod load_step;
 pub mod newton;

@@ -4,14 +4,17 @@
 //! `a = (σ_c − σ_t) / (σ_c + σ_t)`, `k = 2 σ_c σ_t / (σ_c + σ_t)`. Both yield stresses grow by the same factor.
 
 use super::{Elastic, Flow, Softening, Trial};
+use serde::{Deserialize, Serialize};
 
 /// Perfect, or hardening with the plastic multiplier.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct DruckerPrager {
     pub tension_mpa: f64,
     /// A magnitude, not below `tension_mpa`.
     pub compression_mpa: f64,
     /// Slope of uniaxial compressive stress over plastic strain; 0 is perfect.
+    #[serde(default)]
     pub hardening_mpa: f64,
 }
 

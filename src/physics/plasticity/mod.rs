@@ -5,10 +5,14 @@
 //! Stresses in MPa. Tensors have the components 11, 22, 33, 23, 13, 12; shears of strains are engineering shears.
 
 mod drucker_prager;
+mod setting;
 mod von_mises;
 
 pub use drucker_prager::DruckerPrager;
+pub use setting::{LabelLaw, Plasticity};
 pub use von_mises::VonMises;
+
+use serde::{Deserialize, Serialize};
 
 /// Six components of a symmetric tensor.
 pub type Tensor = [f64; 6];
@@ -29,7 +33,8 @@ pub struct Point {
 }
 
 /// A law of yield and flow.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum YieldLaw {
     VonMises(VonMises),
     /// Unlike yield in tension and compression.

@@ -1,12 +1,15 @@
 //! Owns von Mises plasticity: `√(3/2 s:s) = σ_y + H α` (Simo & Taylor 1985, consistent tangent).
 
 use super::{Elastic, Flow, Softening, Trial};
+use serde::{Deserialize, Serialize};
 
 /// Perfect, or hardening with the equivalent plastic strain.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct VonMises {
     pub yield_mpa: f64,
     /// Slope of uniaxial stress over plastic strain; 0 is perfect.
+    #[serde(default)]
     pub hardening_mpa: f64,
 }
 

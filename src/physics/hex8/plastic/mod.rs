@@ -90,10 +90,6 @@ impl<'a, E: Coarsen, T: Fn(usize) -> Tissue + Sync> PlasticBricks<'a, E, T> {
         &self.before
     }
 
-    pub fn points(&self) -> &Points {
-        &self.points
-    }
-
     /// The tangent at the last displacements whose forces were asked for.
     pub fn tangent_in<K: Scalar>(&self) -> Tangent<'a, E, K> {
         Tangent::new(self.elastic, self.mesh, &self.points, &self.yielded)
@@ -206,9 +202,17 @@ impl<'a, E: Coarsen, T: Fn(usize) -> Tissue + Sync> PlasticBricks<'a, E, T> {
         segment.map_or([[0.0; 3]; 8], |s| corners(&s.rows, 0, u))
     }
 
-    /// Strains at the points of an element, by its node.
-    pub fn strains(&self, node: usize, u: &[[f64; 3]]) -> [Tensor; 8] {
-        self.points.strains(&self.corners(node, u))
+    /// Share of the elements whose middle has turned by more than `radians`.
+    pub fn share_turned(&self, u: &[[f64; 3]], radians: f64) -> f64 {
+        let turned = |node: usize| {
+            let gradients = self.points.displacement_gradients(&self.corners(node, u));
+            let mean = |i: usize, j: usize| gradients.iter().map(|g| g[i][j]).sum::<f64>() / 8.0;
+            let axial = [(2, 1), (0, 2), (1, 0)].map(|(i, j)| 0.5 * (mean(i, j) - mean(j, i)));
+            axial.iter().map(|v| v * v).sum::<f64>().sqrt() > radians
+        };
+        let count = (0..self.mesh.len()).into_par_iter();
+        let count = count.filter(|node| self.mesh.has_element(*node) && turned(*node)).count();
+        count as f64 / self.mesh.elements as f64
     }
 
 }

@@ -41,6 +41,8 @@ pub struct Step {
     pub evaluations: usize,
     /// Attempts that failed before.
     pub cuts: u32,
+    /// Integration points that have ever flowed.
+    pub yielded_points: usize,
 }
 
 /// Where a body is between two steps: all that a stopped solve resumes from.
@@ -143,7 +145,10 @@ pub fn load<E: Coarsen, T: Fn(usize) -> Tissue + Sync>(
             continue;
         };
         let balance = body.accept(&history.u, &u, &work.forces);
-        let step = step(history, load, &u, &work.forces, (balance, found, cuts));
+        let step = Step {
+            yielded_points: yielded_points(body.states()),
+            ..step(history, load, &u, &work.forces, (balance, found, cuts))
+        };
         history.steps.push(step);
         history.before = std::mem::replace(&mut history.u, u);
         if cuts == 0 {
@@ -179,5 +184,11 @@ fn step(
         iterations: found.cg_iterations,
         evaluations: found.evaluations,
         cuts,
+        yielded_points: 0,
     }
+}
+
+fn yielded_points(states: &[State]) -> usize {
+    let points = states.iter().flat_map(|state| &state.points);
+    points.filter(|point| point.hardening > 0.0).count()
 }

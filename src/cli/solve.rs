@@ -2,11 +2,13 @@
 
 use super::settings::{LatticeSettings, TissueSettings};
 use super::{print_json, words};
+use crate::cli::words::law;
 use bonepd_ct::command::{Outcome, run_settings};
 use bonepd_ct::error::{Error, Result};
 use bonepd_ct::export::tetrahedra::Kind;
 use bonepd_ct::grid::Axis;
 use bonepd_ct::machine::session::Session;
+use bonepd_ct::physics::plasticity::Plasticity;
 use bonepd_ct::pipeline::apparent::checks::needs_modulus;
 use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams};
@@ -102,7 +104,8 @@ pub struct SolveSettings {
     mechanisms: bool,
     /// Fields to write, comma-separated: displacement (mm), sed (strain energy density, MPa), fraction (bone in an element, weight
     /// of a site), nodal-force (N); of voxel-fe also von-mises (MPa), effective-strain, strain and stress (xx, yy, zz, yz, xz,
-    /// xy; engineering shears), principal-strain and principal-stress (values and directions). Of voxel-fe as NIfTI on the
+    /// xy; engineering shears), principal-strain and principal-stress (values and directions),
+    /// with --plasticity plastic-strain. Of voxel-fe as NIfTI on the
     /// scan's grid and fields.vti for ParaView, of a lattice as fields-LATTICE.vtk, by site [default: none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::choice::<Field>(Field::WORDS), hide_possible_values = true)]
     fields: Vec<Field>,
@@ -124,6 +127,14 @@ pub struct SolveSettings {
     /// Effective strain in that criterion
     #[arg(long, value_name = "STRAIN", value_parser = words::positive, requires = "failure")]
     critical_strain: Option<f64>,
+    /// voxel-fe: tissue that yields: von-mises:YIELD[,HARDENING], or asymmetric:TENSION,COMPRESSION[,HARDENING] (Drucker-Prager
+    /// through both yield stresses), MPa; without HARDENING it is perfectly plastic. Per label as
+    /// labels:100=von-mises:68,127=asymmetric:50,75. Writes DIR/curve.csv
+    #[arg(long, value_name = "LAW", value_parser = law::plasticity)]
+    plasticity: Option<Plasticity>,
+    /// Of --plasticity: even load steps; one that fails is halved [default: 10]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), requires = "plasticity")]
+    steps: Option<u16>,
     /// Only the bone of these labels counts in that criterion, comma-separated
     #[arg(
         long,
@@ -175,6 +186,10 @@ impl SolveSettings {
         }
         params.sed = self.sed.unwrap_or(params.sed);
         params.statistics |= self.statistics;
+        if let Some(plasticity) = &self.plasticity {
+            params.plasticity = Some(plasticity.clone());
+        }
+        params.steps = self.steps.map_or(params.steps, usize::from);
         if !self.failure_labels.is_empty() {
             params.failure_labels.clone_from(&self.failure_labels);
         }
@@ -217,6 +232,7 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     let (rows, met) = match args.error {
         Some(target) => {
             needs_modulus(params.load, "error")?;
+            refuse_plasticity(&params)?;
             let found =
                 bonepd_ct::command::adaptive::solve_to(&args.dir, target, &params, session)?;
             (found.rows, found.met)
@@ -259,6 +275,17 @@ fn export(
         )),
         "stl" => export_smooth(dir, Kind::Stl, params, bins, session),
         _ => export_smooth(dir, Kind::Vtu, params, bins, session),
+    }
+}
+
+fn refuse_plasticity(params: &SolveParams) -> Result<()> {
+    match params.plasticity {
+        None => Ok(()),
+        Some(_) => Err(Error::setting(
+            "--error",
+            "it states the error of the elastic modulus, and --plasticity asks for the strength",
+            "leave --error out, and compare with --refine-mask 2 and twice the --steps",
+        )),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Owns the words of the command line: lists, percentages, crops, choices; from text to plain values.
 
+pub mod law;
+
 use bonepd_ct::io::percent;
 use bonepd_ct::physics::material::{Label, Law};
 use bonepd_ct::pipeline::segment::{Align, Voi};

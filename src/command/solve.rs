@@ -1,5 +1,7 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
 
+mod kept_steps;
+
 use crate::command::fields::Fields;
 use crate::command::in_words::{in_words, sections_in_words};
 use crate::command::lattice::binned;
@@ -18,6 +20,7 @@ use crate::pipeline::apparent::job::{Job, JobResult};
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::{Load, SolveParams, jobs};
 use crate::pipeline::lattice::LatticeParams;
+use crate::record::details;
 use crate::record::results::Results;
 use crate::record::specimen;
 use crate::result::cautions;
@@ -33,6 +36,7 @@ use crate::result::voxel_check;
 use crate::solver::cg::CgStep;
 use crate::volume::{Specimen, Volume};
 use indicatif::ProgressBar;
+use kept_steps::KeptSteps;
 use std::path::{Path, PathBuf};
 
 /// A segmented scan opened for solves: its mask is read, hashed and measured once for all of them.
@@ -178,8 +182,16 @@ impl OpenScan {
                 session.result(line);
             }
             // The row first: fields that cannot be written do not cost it.
+            let curve = match is_kept {
+                true => self.results.details(blank, params).curve,
+                false => details.curve.clone(),
+            };
             if !is_kept {
                 self.results.store(blank, params, &row, details)?;
+            }
+            if !curve.is_empty() {
+                details::write_curve(&self.dir, &curve)?;
+                kept_steps::forget(&self.dir);
             }
             fields.write(&self.dir)?;
             rows.push(row);
@@ -261,7 +273,8 @@ impl OpenScan {
         );
         bar.set_message("building the model and its multigrid");
         let loads = if params.load == Load::Stiffness { 6 } else { 1 };
-        let solution = job.solve(prepared, params, &mut |load, step| {
+        let mut kept = KeptSteps::new(&self.dir, self.results.fingerprint(blank, params), session);
+        let solution = job.solve(prepared, params, &mut kept, &mut |load, step| {
             show(&bar, [load, loads], step, params.tolerance);
         })?;
         bar.finish_and_clear();

@@ -1,5 +1,6 @@
 //! Owns the seam for nonlinear equations `R(q) = 0`: what a solver may know of a model during one time step.
 
+use crate::operator::MixedPrecision;
 use crate::operator::sparse::Sparse;
 
 /// Equations with their exact tangent.
@@ -22,4 +23,15 @@ pub trait Staggered: Nonlinear {
     fn local_diagonal(&self, q: &[f64], d: &mut [f64]);
     /// `−∂R/∂q` among the other unknowns; symmetric positive definite but for followers.
     fn stiffness(&self, q: &[f64], k: &mut Sparse);
+}
+
+/// A body whose forces depend on displacements and on what happened before, step by step. Everything is the free body: supports are
+/// given to the solver separately, as held components.
+pub trait Incremental: Sync {
+    type Tangent: MixedPrecision;
+
+    /// Forces that the displacements `u` take at the end of the step.
+    fn forces(&mut self, u: &[[f64; 3]], f: &mut [[f64; 3]]);
+    /// `∂f/∂u` at the displacements whose forces were asked for last; symmetric, and positive semi-definite.
+    fn tangent(&self) -> Self::Tangent;
 }

@@ -8,4 +8,5 @@ pub mod hex8;
 pub mod hyperelastic;
 pub mod lattice;
 pub mod material;
+pub mod plasticity;
 pub mod tet10;

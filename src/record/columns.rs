@@ -12,7 +12,7 @@ pub use crate::record::column::{Column, File};
 use crate::record::detail_columns;
 
 /// All files, in the order in which readers meet them.
-pub const FILES: [File; 16] = [
+pub const FILES: [File; 18] = [
     File {
         name: "answers.csv",
         about: "one row a scan: its apparent modulus with all of its stated error, by the row of the least stated error",
@@ -27,6 +27,8 @@ pub const FILES: [File; 16] = [
     detail_columns::FAILURE,
     detail_columns::SECTIONS,
     detail_columns::TISSUE,
+    detail_columns::YIELDED,
+    detail_columns::CURVE,
     File {
         name: "groups.csv",
         about: "one row a quantity and group (in the report's folder)",
@@ -122,7 +124,7 @@ const ANSWERS: [Column; 25] = [
     column(
         "yield_stress_mpa",
         "MPa",
-        "apparent yield stress; NA until there are nonlinear solves",
+        "apparent yield stress by the 0.2 % offset; NA without --plasticity",
     ),
     column(
         "threshold_sensitivity",
@@ -135,7 +137,7 @@ const ANSWERS: [Column; 25] = [
     FAILURE_MOMENT,
 ];
 
-const RESULTS: [Column; 56] = [
+const RESULTS: [Column; 61] = [
     SCAN,
     METHOD,
     STRUCTURE,
@@ -268,6 +270,15 @@ const RESULTS: [Column; 56] = [
     FAILURE_DISPLACEMENT,
     FAILURE_STRAIN,
     SED,
+    column("plasticity", "", "law by which tissue yields, as on the command line; NA where it is elastic"),
+    column("steps", "", "even load steps of plasticity; failed ones are halved"),
+    column(
+        "yield_stress_mpa",
+        "MPa",
+        "apparent stress at yield by the 0.2 % offset, a magnitude; NA where the curve ends before",
+    ),
+    column("yield_strain", "", "nominal strain at yield, a magnitude"),
+    column("max_stress_mpa", "MPa", "largest apparent stress of the curve, a magnitude"),
 ];
 
 const FAILED: [Column; 3] = [
@@ -292,6 +303,7 @@ mod tests {
     use crate::result::details::{EndForces, FailureAt, SectionShare, TissueSpread};
     use crate::result::row::Row;
     use crate::result::statistics::anova::Anova;
+    use crate::result::strength::{CurvePoint, YieldedShare};
     use std::collections::BTreeSet;
 
     /// A column of a file is described, and what is described is a column.
@@ -313,6 +325,8 @@ mod tests {
             ("failure.csv", to_csv::<Line<FailureAt>>(&[])),
             ("sections.csv", to_csv::<Line<SectionShare>>(&[])),
             ("tissue.csv", to_csv::<Line<TissueSpread>>(&[])),
+            ("yielded.csv", to_csv::<Line<YieldedShare>>(&[])),
+            ("curve.csv", to_csv::<CurvePoint>(&[])),
         ] {
             let file = FILES.iter().find(|f| f.name == name).unwrap();
             let described: Vec<&str> = file.columns.iter().map(|c| c.name).collect();

@@ -113,6 +113,38 @@ pub const SECTIONS: File = File {
     ]),
 };
 
+pub const YIELDED: File = File {
+    name: "yielded.csv",
+    about: "what has flowed of each tissue at the end of the load, where --plasticity is given",
+    columns: &with::<19>(&[
+        LABEL,
+        ELEMENTS,
+        column("yielded_share", "", "share of the volume that has ever flowed, by integration points"),
+        column(
+            "maximum_plastic_strain",
+            "",
+            "largest equivalent plastic strain √(2/3 ε:ε), means of elements",
+        ),
+        column("mean_plastic_strain", "", "the same, mean over all elements"),
+    ]),
+};
+
+pub const CURVE: File = File {
+    name: "curve.csv",
+    about: "the stress-strain curve of the last solve with --plasticity, one line a load step; signed as the strain",
+    columns: &[
+        column("step", "", "number of the load step, from 1"),
+        column("strain", "", "nominal: displacement over the distance of the ends"),
+        column("stress_mpa", "MPa", "force over the whole end area, pores included"),
+        column("force_n", "N", "along the displacement of the ends, from the work of the step"),
+        column("plastic_volume_fraction", "", "share of the bone that has ever flowed"),
+        column("energy_mj", "mJ", "stored elastically now"),
+        column("dissipated_mj", "mJ", "by plastic flow since the start"),
+        column("work_mj", "mJ", "of the ends since the start: mean force of a step times its displacement"),
+        column("iterations", "", "of conjugate gradients in this step"),
+    ],
+};
+
 pub const TISSUE: File = File {
     name: "tissue.csv",
     about: "how strains and stresses are distributed over the elements of each tissue, where --statistics asks for it",

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::grid::Axis;
 use crate::io::{atomic, table};
 use crate::result::details::{Details, EndForces, FailureAt, SectionShare, TissueSpread};
+use crate::result::strength::{CurvePoint, YieldedShare};
 use crate::result::settings::{BoundaryRule, CellType, Load, Method, Sed, Settings, Supports};
 use serde::Serialize;
 use std::path::Path;
@@ -13,6 +14,8 @@ pub const REACTIONS: &str = "reactions.csv";
 pub const FAILURE: &str = "failure.csv";
 pub const SECTIONS: &str = "sections.csv";
 pub const TISSUE: &str = "tissue.csv";
+pub const YIELDED: &str = "yielded.csv";
+pub const CURVE: &str = "curve.csv";
 
 /// One line of such a table: the solve, and what it says.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -76,14 +79,28 @@ pub fn write<'a>(
     table_of::<EndForces>(&dir.join(REACTIONS), rows.clone(), |d| &d.ends)?;
     table_of::<FailureAt>(&dir.join(FAILURE), rows.clone(), |d| &d.failure)?;
     table_of::<SectionShare>(&dir.join(SECTIONS), rows.clone(), |d| &d.sections)?;
+    table_of::<YieldedShare>(&dir.join(YIELDED), rows.clone(), |d| &d.yielded)?;
     table_of::<TissueSpread>(&dir.join(TISSUE), rows, |d| &d.tissue)
 }
 
 /// Removes the tables in `dir`, whose rows are set aside.
 pub fn remove(dir: &Path) {
-    for table in [REACTIONS, FAILURE, SECTIONS, TISSUE] {
+    for table in [REACTIONS, FAILURE, SECTIONS, TISSUE, CURVE] {
         let _ = std::fs::remove_file(dir.join(table));
     }
+}
+
+/// Writes the stress–strain curve of one solve.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_curve(dir: &Path, curve: &[CurvePoint]) -> Result<()> {
+    atomic::write(&dir.join(CURVE), table::to_csv(curve))
+}
+
+/// The curve that the last solve in `dir` left.
+pub fn curve(dir: &Path) -> Option<Vec<CurvePoint>> {
+    table::read(&dir.join(CURVE)).ok()
 }
 
 fn table_of<'a, T: Clone + Default + Serialize + 'a>(

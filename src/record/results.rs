@@ -146,6 +146,19 @@ impl Results {
             .map(|old| old.row.clone())
     }
 
+    /// The details of the row that [`Results::find`] finds; none where there is no such row.
+    pub fn details(&self, blank: &Row, params: &SolveParams) -> Details {
+        let key = Some(key(blank, params));
+        let found = self.record.rows.iter().find(|old| old.key == key);
+        found.map_or_else(Details::default, |old| old.details.clone())
+    }
+
+    /// What tells a solve of this mask from every other, in short.
+    pub fn fingerprint(&self, blank: &Row, params: &SolveParams) -> String {
+        let version = &self.record.provenance.version;
+        format!("solve {version} {} {}", key(blank, params), self.mask_blake3())
+    }
+
     /// Stores a solved row with its details, in place of an older one of the same settings, and writes all files.
     pub fn store(
         &mut self,

@@ -1,5 +1,7 @@
 //! Owns the report's figures over lattice parameter, bone volume fraction and time.
 
+pub mod strength;
+
 use super::figure::{Axis, Content, Curve, Figure, Mark, Point};
 use super::table::{condition, varying_settings};
 use super::{Model, distinct};

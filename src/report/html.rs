@@ -207,7 +207,7 @@ mod tests {
     /// A reader of the page has no repository.
     #[test]
     fn a_page_is_about_its_scans_alone() {
-        let report = crate::report::report(&[], Default::default(), &Default::default());
+        let report = crate::report::report(&[], Default::default(), &[], &Default::default());
         let page = render(&report, &[], &Source::default()).unwrap();
         assert!(page.contains("Recipe and provenance"));
         for words in ["cargo ", "reports/", "Validation"] {

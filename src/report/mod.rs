@@ -18,6 +18,7 @@ pub mod table;
 
 use crate::result::cautions::WARNING;
 use crate::result::notes::{Alike, Alikes, parts};
+use crate::result::strength::CurvePoint;
 use crate::result::row::Row;
 use crate::result::settings::{BoundaryRule, Elements, Method};
 use answers::Answers;
@@ -61,9 +62,16 @@ pub struct Report {
     pub method_notes: Vec<String>,
 }
 
-/// Tables and figures of `rows`, in their order, and of their answers.
-pub fn report(rows: &[Row], answers: Answers, params: &ReportParams) -> Report {
+/// Tables and figures of `rows`, in their order, and of their answers; `strength` has the stress–strain curves of scans.
+pub fn report(
+    rows: &[Row],
+    answers: Answers,
+    strength: &[(String, Vec<CurvePoint>)],
+    params: &ReportParams,
+) -> Report {
     let mut figures = answer_figures::figures(&answers);
+    let strength = strength.iter();
+    figures.extend(strength.filter_map(|(scan, curve)| curves::strength::stress_strain(scan, curve)));
     figures.extend(curves::convergence(rows));
     figures.extend(curves::wall_time(rows));
     figures.extend(curves::speed_error(rows));

@@ -1,6 +1,7 @@
 //! Owns what a solve says besides its row: forces at both ends, failure at other volumes, sections, tissue by label. Each
 //! list is a tidy table of its own.
 
+use crate::result::strength::{CurvePoint, YieldedShare};
 use serde::{Deserialize, Serialize};
 
 /// What goes with one row.
@@ -19,6 +20,12 @@ pub struct Details {
     /// `tissue.csv`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tissue: Vec<TissueSpread>,
+    /// `curve.csv`, of the last solve of its kind.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub curve: Vec<CurvePoint>,
+    /// `yielded.csv`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub yielded: Vec<YieldedShare>,
 }
 
 /// Force and moment that the support puts on one end, the moment about the middle of that end's plane.

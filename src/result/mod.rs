@@ -13,4 +13,5 @@ pub mod row;
 pub mod settings;
 pub mod shape;
 pub mod statistics;
+pub mod strength;
 pub mod voxel_check;

@@ -4,6 +4,7 @@ mod columns;
 
 use crate::result::notes;
 use crate::result::settings::Settings;
+use crate::result::strength::Strength;
 use columns::Columns;
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +52,8 @@ pub struct Solution {
     pub mechanisms: Option<u64>,
     /// By Pistoia's criterion, on request.
     pub failure: Option<FailureLoad>,
+    /// Of tissue that yields.
+    pub strength: Strength,
 }
 
 /// Failure; magnitudes.

@@ -242,6 +242,10 @@ pub struct Settings {
     pub material: Option<String>,
     /// Which strain energy density is reported, and Pistoia's criterion reads. None for lattices.
     pub sed: Option<Sed>,
+    /// The law by which tissue yields; None where it is elastic.
+    pub plasticity: Option<String>,
+    /// Load steps of such tissue.
+    pub steps: Option<u64>,
 }
 
 impl Settings {

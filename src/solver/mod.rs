@@ -6,5 +6,6 @@ pub mod cg;
 pub mod chord;
 pub mod direct;
 pub mod lanczos;
+pub mod load_step;
 pub mod nested;
 pub mod newton;

@@ -13,7 +13,7 @@ use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
 use crate::record::collect_rows::CollectedRows;
-use crate::record::details::{FAILURE, REACTIONS, SECTIONS, TISSUE};
+use crate::record::details::{FAILURE, REACTIONS, SECTIONS, TISSUE, curve as curve_of};
 use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::specimen;
@@ -28,6 +28,7 @@ use crate::report::{markdown, plot};
 use crate::result::answer::ScanFacts;
 use crate::result::ffb::with_ffb;
 use crate::result::row::Row;
+use crate::result::strength::CurvePoint;
 use std::path::{Path, PathBuf};
 
 /// The recipe as it was run, in the output folder of a run.
@@ -102,7 +103,7 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
         dirs,
         recipe,
     } = sources;
-    let mut report = assemble(rows, answers, params);
+    let mut report = assemble(rows, answers, &strength(rows, dirs), params);
     report.notes.extend(same_masks(rows, dirs));
     let failed = failures.iter().map(|f| {
         let reason = f.reason.lines().next().unwrap_or_default();
@@ -172,6 +173,16 @@ fn render(
     }
     bar.finish_and_clear();
     Ok(files)
+}
+
+/// The stress–strain curves of the scans of `rows`.
+fn strength(rows: &[Row], dirs: &[PathBuf]) -> Vec<(String, Vec<CurvePoint>)> {
+    let scans = pages(rows, &[]).into_iter().map(|page| page.scan);
+    let curve = |scan: String| {
+        let (dir, _) = folder(&scan, dirs)?;
+        Some((scan, curve_of(&dir)?))
+    };
+    scans.filter_map(curve).collect()
 }
 
 /// A page for each scan of `rows`.

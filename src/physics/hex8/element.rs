@@ -96,7 +96,7 @@ fn shear(g: &[[f64; 3]; 8], i: usize, j: usize) -> f64 {
 }
 
 /// Gradients (1/mm) of the eight shape functions at a Gauss point.
-fn gradients(h: [f64; 3], point: usize) -> [[f64; 3]; 8] {
+pub(super) fn gradients(h: [f64; 3], point: usize) -> [[f64; 3]; 8] {
     let s = 0.5 / 3f64.sqrt();
     let at: [f64; 3] = std::array::from_fn(|a| {
         if point >> a & 1 == 1 {

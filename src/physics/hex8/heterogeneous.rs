@@ -102,7 +102,7 @@ impl Heterogeneous {
 
 /// The node that is the corner of smallest x, y, z of element `e` around node `i` of a segment.
 #[inline(always)]
-fn low_corner(rows: &[u32; 9], i: usize, e: usize) -> usize {
+pub(super) fn low_corner(rows: &[u32; 9], i: usize, e: usize) -> usize {
     let (x, y, z) = (e & 1, e >> 1 & 1, e >> 2);
     rows[y + 3 * z] as usize + i + x - 1
 }

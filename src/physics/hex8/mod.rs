@@ -6,6 +6,7 @@
 pub mod element;
 pub mod fields;
 pub mod heterogeneous;
+pub mod plastic;
 mod kernel;
 mod modes;
 mod stencils;

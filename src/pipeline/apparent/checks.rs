@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::pipeline::apparent::fields::Field;
-use crate::pipeline::apparent::params::{Load, Method, SolveParams};
+use crate::physics::plasticity::Plasticity;
+use crate::pipeline::apparent::params::{CoarsenBy, Load, Method, SolveParams};
 use crate::result::settings::Motion;
 
 impl SolveParams {
@@ -88,6 +89,7 @@ impl SolveParams {
                 "give a size in mm above 0, or leave it out: it then follows from the struts",
             ));
         }
+        check_plasticity(self)?;
         if self.max_iterations == 0 {
             return Err(Error::setting(
                 "solve.max_iterations",
@@ -131,6 +133,68 @@ fn check_recorded(params: &SolveParams) -> Result<()> {
             "labels are given for a failure load that is not asked for",
             "add --failure, or leave the labels out",
         ));
+    }
+    Ok(())
+}
+
+/// Refuses what does not fit tissue that yields.
+fn check_plasticity(params: &SolveParams) -> Result<()> {
+    let wrong = |key: &str, found: &str, advice: &str| Err(Error::setting(key, found, advice));
+    let Some(plasticity) = &params.plasticity else {
+        return match params.fields.contains(&Field::PlasticStrain) {
+            true => wrong(
+                "solve.fields",
+                "elastic tissue has no plastic strain",
+                "add --plasticity, or leave the field plastic-strain out",
+            ),
+            false => Ok(()),
+        };
+    };
+    plasticity.check()?;
+    if params.steps == 0 {
+        return wrong("solve.steps", "0 load steps load nothing", "give 1 or more (usual: 10)");
+    }
+    if params.method == Method::Lattice {
+        return wrong(
+            "solve.plasticity",
+            "plasticity is of voxel elements: bonds of a lattice do not flow",
+            "add --method voxel-fe, or leave --plasticity out",
+        );
+    }
+    if params.load.is_by_angle() || params.load == Load::Stiffness {
+        return wrong(
+            "solve.plasticity",
+            "bending, torsion and unit strains have no stress-strain curve",
+            "use --load uniaxial, confined or shear, or leave --plasticity out",
+        );
+    }
+    if params.coarsen > 1 && params.coarsen_by == CoarsenBy::Fraction {
+        return wrong(
+            "solve.coarsen_by",
+            "elements that are partly bone have no yield stress of their own",
+            "use --coarsen-by threshold, or leave --coarsen out",
+        );
+    }
+    if params.coarsen > 1 && matches!(plasticity, Plasticity::Labels(_)) {
+        return wrong(
+            "solve.plasticity",
+            "elements of several voxels have no label",
+            "leave --coarsen out, or give one law for all tissue",
+        );
+    }
+    if params.pistoia.is_some() || params.statistics {
+        return wrong(
+            "solve.plasticity",
+            "Pistoia's rule and the statistics are of elastic tissue",
+            "leave --failure and --statistics out: the curve has the strength itself",
+        );
+    }
+    if params.fields.iter().any(|field| !Field::OF_YIELDED.contains(field)) {
+        return wrong(
+            "solve.fields",
+            "stresses and energy densities are written of elastic tissue only",
+            "ask for displacement, strain, principal-strain, nodal-force or plastic-strain",
+        );
     }
     Ok(())
 }

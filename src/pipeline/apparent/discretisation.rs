@@ -1,9 +1,13 @@
 //! Owns the seam: what a solve needs of a three-dimensional discretisation of a specimen.
 
+pub mod steps;
+pub mod yielded;
+
 use crate::error::Result;
 use crate::measure::apparent::EndWork;
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
+use crate::pipeline::apparent::discretisation::yielded::{Kept, Yielded};
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
@@ -61,6 +65,20 @@ pub trait Discretisation: Sized {
 
     /// Apparent moduli of a solution under [`LoadSet::Ends`], where the ends come nearer or part.
     fn assess(&self, solved: &Equilibrated) -> Moduli;
+
+    /// The body at the end of its load steps, from the elastic solution `elastic` under the whole load; None where nothing can yield.
+    ///
+    /// # Errors
+    /// Settings that do not fit the specimen, steps that cannot be kept.
+    fn load_to_yield(
+        &self,
+        _prepared: Prepared,
+        _held: &Held,
+        _elastic: &Displacements,
+        _kept: &mut dyn Kept,
+    ) -> Result<Option<Yielded>> {
+        Ok(None)
+    }
 
     /// Fields and other numbers of the same solution, as far as the settings ask for them.
     ///

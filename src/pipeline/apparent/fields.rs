@@ -14,6 +14,8 @@ pub struct Equilibrated<'a> {
     pub u: &'a [[f64; 3]],
     pub force: &'a [[f64; 3]],
     pub info: &'a CgInfo,
+    /// Equivalent plastic strain of the elements that have yielded, by index in the mesh's grid, rising; None where nothing can yield.
+    pub plastic: Option<&'a [(usize, f32)]>,
 }
 
 /// A field of a solved model.
@@ -36,6 +38,8 @@ pub enum Field {
     EffectiveStrain,
     /// What the supports put on the nodes.
     NodalForce,
+    /// Equivalent plastic strain.
+    PlasticStrain,
 }
 
 impl Field {
@@ -51,6 +55,17 @@ impl Field {
         "principal-stress",
         "effective-strain",
         "nodal-force",
+        "plastic-strain",
+    ];
+
+    /// Those that a body that has yielded has: displacements and what follows from them.
+    pub const OF_YIELDED: &[Field] = &[
+        Field::Displacement,
+        Field::Strain,
+        Field::PrincipalStrain,
+        Field::Fraction,
+        Field::NodalForce,
+        Field::PlasticStrain,
     ];
 
     /// Those that lattices have.

@@ -6,6 +6,7 @@ use crate::operator::{Functional, MixedPrecision, Operator};
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, Prepared, System,
 };
+use crate::pipeline::apparent::discretisation::yielded::{Kept, NotKept};
 use crate::pipeline::apparent::equilibrium::{Observe, equilibrium};
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::mechanisms::mechanisms;
@@ -32,14 +33,15 @@ pub trait Solve: Send + Sync {
     /// Settings that do not fit the specimen.
     fn cost(&self, params: &SolveParams, known: Known) -> Result<Cost>;
 
-    /// Discretises and solves.
+    /// Discretises and solves; load steps are kept in `kept`.
     ///
     /// # Errors
-    /// Settings that do not fit the specimen. Not converging is no error: the solution says so.
+    /// Settings that do not fit the specimen, steps that cannot be kept. Not converging is no error: the solution says so.
     fn solve(
         &self,
         prepared: Prepared,
         params: &SolveParams,
+        kept: &mut dyn Kept,
         observe: &mut Observe,
     ) -> Result<JobResult>;
 }
@@ -78,7 +80,7 @@ impl Job {
     ) -> Result<JobResult> {
         params.check()?;
         let tissue = &Tissue::of(specimen, params)?;
-        self.solve(Prepared { specimen, tissue }, params, observe)
+        self.solve(Prepared { specimen, tissue }, params, &mut NotKept, observe)
     }
 }
 
@@ -115,6 +117,7 @@ impl<D: Discretisation> Solve for Of<D> {
         &self,
         prepared: Prepared,
         params: &SolveParams,
+        kept: &mut dyn Kept,
         observe: &mut Observe,
     ) -> Result<JobResult> {
         if params.load == Load::Stiffness {
@@ -135,10 +138,11 @@ impl<D: Discretisation> Solve for Of<D> {
             .expect("one motion of the ends is one load");
         let mut force = vec![[0.0; 3]; u.len()];
         system.operator.apply(&u, &mut force);
-        let solved = Equilibrated {
+        let elastic = Equilibrated {
             u: &u,
             force: &force,
             info: &info,
+            plastic: None,
         };
         let EndSites {
             motion,
@@ -146,23 +150,44 @@ impl<D: Discretisation> Solve for Of<D> {
             each,
         } = model.ends();
         let moduli = match motion.motion {
-            Motion::Along => model.assess(&solved),
+            Motion::Along => model.assess(&elastic),
             _ => Moduli::NONE,
         };
-        let work = motion.work(&moduli, &info);
-        let mut recorded = model.fields(prepared, params, &solved, &work)?;
-        recorded.details.ends = reactions(&motion, planes_mm, &force, each).to_vec();
+        let mut work = motion.work(&moduli, &info);
+        let yielded = match info.ended.converged() {
+            true => model.load_to_yield(prepared, &system.held, &u, kept)?,
+            false => None,
+        };
+        let end = match &yielded {
+            None => elastic,
+            Some(y) => Equilibrated {
+                u: &y.u,
+                force: &y.force,
+                info: &info,
+                plastic: Some(&y.plastic),
+            },
+        };
+        let mut recorded = model.fields(prepared, params, &end, &work)?;
+        recorded.details.ends = reactions(&motion, planes_mm, end.force, each).to_vec();
+        let iterations = info.iterations + yielded.as_ref().map_or(0, |y| y.iterations);
+        let yielding = yielded.map(|y| y.yielding);
+        if let Some(y) = &yielding {
+            recorded.details.curve.clone_from(&y.curve);
+            recorded.details.yielded.clone_from(&y.shares);
+            work.force_n = y.curve.last().map(|p| p.force_n.abs());
+        }
         let solved = Solved {
             sites: system.sites,
             dropped: system.dropped,
             unknowns: system.held.free::<3>(),
-            iterations: info.iterations,
+            iterations,
             residual: info.residual,
             ended: info.ended,
             moduli,
             work,
             mechanisms,
             no_answer: moduli.e_app_mpa == 0.0,
+            yielding,
         };
         Ok(JobResult::Modulus(solved, recorded))
     }

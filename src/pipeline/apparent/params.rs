@@ -4,6 +4,7 @@ use crate::grid::Axis;
 use crate::io::percent;
 use crate::measure::pistoia::Pistoia;
 use crate::physics::material::Material;
+use crate::physics::plasticity::Plasticity;
 use crate::pipeline::apparent::fields::Field;
 pub use crate::result::settings::{Conditions, Ends, Load, Method, Sed};
 use serde::{Deserialize, Serialize};
@@ -28,6 +29,11 @@ pub struct SolveParams {
     pub poisson: f64,
     /// How tissue differs from voxel to voxel. None: E and ν as above everywhere.
     pub material: Option<Material>,
+    /// voxel-fe: how tissue yields. None: it is elastic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plasticity: Option<Plasticity>,
+    /// Of plasticity: even load steps, halved where one fails.
+    pub steps: usize,
     /// Nominal strain u / L_g; negative is compression.
     #[serde(deserialize_with = "percent::deserialize")]
     pub strain: f64,
@@ -78,6 +84,8 @@ impl Default for SolveParams {
             young_mpa: 1000.0,
             poisson: 0.3,
             material: None,
+            plasticity: None,
+            steps: 10,
             strain: -0.01,
             grip_mm: 0.0,
             load: Load::Uniaxial,
@@ -116,6 +124,6 @@ impl SolveParams {
 
     /// Whether labels of the scan are read where it has some.
     pub fn needs_labels(&self) -> bool {
-        self.statistics || !self.failure_labels.is_empty()
+        self.statistics || !self.failure_labels.is_empty() || self.plasticity.is_some()
     }
 }

@@ -1,10 +1,12 @@
 //! Owns what a solve yields, and its row of the results table.
 
 use crate::measure::apparent::EndWork;
+use crate::physics::plasticity::Plasticity;
 use crate::pipeline::apparent::params::{Ends, Load, Method, SolveParams};
 use crate::result::notes;
 use crate::result::row::{Marks, Row, Solution};
 use crate::result::settings::{Motion, Settings, Supports};
+use crate::result::strength::{Strength, Yielding, strength};
 use crate::solver::cg::Ended;
 use crate::volume::Specimen;
 
@@ -49,6 +51,8 @@ pub struct Solved {
     pub mechanisms: Option<usize>,
     /// True where the modulus is 0 although the bone connects the loaded faces: the model does not, or counts none of its sites.
     pub no_answer: bool,
+    /// Of tissue that yields.
+    pub yielding: Option<Yielding>,
 }
 
 impl Solved {
@@ -77,6 +81,7 @@ impl Solved {
             },
             mechanisms: None,
             no_answer,
+            yielding: None,
         }
     }
 
@@ -111,6 +116,8 @@ impl SolveParams {
             tv_mm3: specimen.tv_mm3,
             bv_tv: specimen.bv_tv(),
             tolerance: Some(self.tolerance),
+            plasticity: self.plasticity.as_ref().map(Plasticity::words),
+            steps: self.plasticity.as_ref().map(|_| self.steps as u64),
             sed: (self.method == Method::VoxelFe && self.load != Load::Stiffness)
                 .then_some(self.sed),
             ..Settings::default()
@@ -133,7 +140,7 @@ impl Solved {
             unknowns: count(self.unknowns),
             iterations: count(self.iterations),
             residual: Some(self.residual),
-            converged: Some(self.ended.converged()),
+            converged: Some(self.ended.converged() && !self.is_stopped()),
             // Of no sites the stress is a sum of nothing, which is -0.
             e_app_mpa: modulus(m.e_app_mpa + 0.0),
             e_app_reaction_mpa: modulus(m.from_reaction_mpa),
@@ -145,15 +152,33 @@ impl Solved {
             force_n: of_force(self.work.force_n),
             moment_nmm: self.work.moment_nmm.filter(|v| by_angle && v.is_finite()),
             mechanisms: self.mechanisms.map(|n| n as u64),
+            strength: self
+                .yielding
+                .as_ref()
+                .map_or_else(Strength::default, |y| strength(&y.curve, self.slope(&blank.key))),
             ..Solution::default()
         };
         Row {
             solved: Some(solution),
             marks: Marks {
-                note: self.note(&blank.key),
+                note: self.all_notes(&blank.key),
                 ..blank.marks
             },
             ..blank
+        }
+    }
+
+    /// Whether load steps ended before the whole load.
+    fn is_stopped(&self) -> bool {
+        self.yielding.as_ref().is_some_and(|y| y.stopped)
+    }
+
+    /// Slope of the elastic part of the curve: the modulus, or under shear what the first step has.
+    fn slope(&self, key: &Settings) -> f64 {
+        let first = self.yielding.as_ref().and_then(|y| y.curve.first());
+        match key.load.has_modulus() {
+            true => self.moduli.e_app_mpa,
+            false => first.map_or(f64::NAN, |p| p.stress_mpa / p.strain),
         }
     }
 
@@ -170,6 +195,15 @@ impl Solved {
                 "elements of this size are disconnected although the bone connects the loaded faces"
             }
         }
+    }
+
+    /// The same with what was said of load steps.
+    fn all_notes(&self, key: &Settings) -> Option<String> {
+        let mut note = self.note(key);
+        for words in self.yielding.iter().flat_map(|y| &y.said) {
+            notes::add(&mut note, words);
+        }
+        note
     }
 
     /// What a reader must know of this row, in words.

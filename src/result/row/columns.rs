@@ -5,6 +5,7 @@ use crate::result::row::{FailureLoad, Marks, Row, Solution};
 use crate::result::settings::{
     BoundaryRule, CellType, Elements, Load, Method, Sed, Settings, Supports,
 };
+use crate::result::strength::Strength;
 use serde::{Deserialize, Serialize};
 
 /// A row as files hold it. What the columns mean is at the fields of [`Settings`], [`Solution`] and [`Marks`].
@@ -82,6 +83,16 @@ pub(super) struct Columns {
     failure_strain: Option<f64>,
     #[serde(default)]
     sed: Option<Sed>,
+    #[serde(default)]
+    plasticity: Option<String>,
+    #[serde(default)]
+    steps: Option<u64>,
+    #[serde(default)]
+    yield_stress_mpa: Option<f64>,
+    #[serde(default)]
+    yield_strain: Option<f64>,
+    #[serde(default)]
+    max_stress_mpa: Option<f64>,
 }
 
 impl From<Row> for Columns {
@@ -146,6 +157,11 @@ impl From<Row> for Columns {
             failure_displacement_mm: solved.failure.and_then(|f| f.displacement_mm),
             failure_strain: solved.failure.and_then(|f| f.strain),
             sed: key.sed,
+            plasticity: key.plasticity,
+            steps: key.steps,
+            yield_stress_mpa: solved.strength.yield_stress_mpa,
+            yield_strain: solved.strength.yield_strain,
+            max_stress_mpa: solved.strength.max_stress_mpa,
         }
     }
 }
@@ -180,6 +196,8 @@ impl TryFrom<Columns> for Row {
             tolerance: c.tolerance,
             material: c.material,
             sed: c.sed,
+            plasticity: c.plasticity,
+            steps: c.steps,
         };
         let solved = Solution {
             sites: c.sites,
@@ -202,6 +220,11 @@ impl TryFrom<Columns> for Row {
             wall_s: c.wall_s,
             peak_mib: c.peak_mib,
             mechanisms: c.mechanisms,
+            strength: Strength {
+                yield_stress_mpa: c.yield_stress_mpa,
+                yield_strain: c.yield_strain,
+                max_stress_mpa: c.max_stress_mpa,
+            },
             failure: c.failure_factor.map(|factor| FailureLoad {
                 factor,
                 load_n: c.failure_load_n,

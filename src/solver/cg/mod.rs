@@ -1,5 +1,6 @@
 //! Owns preconditioned conjugate gradients for `minimise ½ uᵀ A u` under prescribed unknowns.
 
+pub mod correction;
 pub mod error;
 pub mod fallback;
 pub mod jacobi;

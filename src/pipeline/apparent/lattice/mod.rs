@@ -147,7 +147,7 @@ impl<'a> Placed<'a> {
         &self,
         stress: &Stress<M>,
         loaded: &Loaded,
-        &Equilibrated { u, force, info }: &Equilibrated,
+        &Equilibrated { u, force, info, .. }: &Equilibrated,
     ) -> Moduli {
         let (axis, sites) = (self.frame.axis.index(), self.indices.len());
         let high = |s: &usize| self.plane(*s) >= self.grips.high;

@@ -58,7 +58,7 @@ impl Bricks {
             }
         };
         let (young, nu) = (solid.young_mpa, solid.poisson);
-        let rule = Integration::of(nu);
+        let rule = rule(params, nu);
         if params.coarsen > 1 {
             let fractions = resample::coarsen(&specimen.bone, params.coarsen);
             let values = fractions.as_slice();
@@ -84,6 +84,14 @@ impl Bricks {
             Bricks::Homogeneous(model) => &model.mesh,
             Bricks::Heterogeneous(model) => model.mesh(),
         }
+    }
+}
+
+/// How elements are integrated: those that may yield by mean dilatation, since plastic flow keeps the volume, in every state.
+pub(super) fn rule(params: &SolveParams, poisson: f64) -> Integration {
+    match params.plasticity {
+        Some(_) => Integration::MeanDilatation,
+        None => Integration::of(poisson),
     }
 }
 
@@ -127,7 +135,7 @@ fn of_mixed(
     let kinds: Vec<(f64, Integration)> = mixed
         .poissons
         .iter()
-        .map(|&nu| (nu, Integration::of(nu)))
+        .map(|&nu| (nu, rule(params, nu)))
         .collect();
     let young = mixed.mean_mpa;
     if params.coarsen > 1 {

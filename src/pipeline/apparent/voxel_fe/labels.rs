@@ -38,6 +38,11 @@ impl Labels {
         Ok(labels)
     }
 
+    /// Those that occur, rising.
+    pub fn all(&self) -> &[i32] {
+        &self.values
+    }
+
     /// Those that tables tell apart: none where all bone has one.
     pub fn several(&self) -> &[i32] {
         match self.values.len() {

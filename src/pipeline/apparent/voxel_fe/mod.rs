@@ -4,6 +4,7 @@ pub mod bricks;
 pub mod cost;
 mod failure;
 mod labels;
+pub mod plastic;
 mod principal;
 mod record;
 mod sections;
@@ -15,11 +16,14 @@ use crate::discretisation::voxels::Planes;
 use crate::error::Result;
 use crate::mask::resample;
 use crate::measure::apparent::EndWork;
+use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
 use crate::par::sum_chunks;
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, Places, Prepared, System,
 };
+use crate::pipeline::apparent::discretisation::Displacements;
+use crate::pipeline::apparent::discretisation::yielded::{Kept, Yielded};
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
@@ -188,6 +192,19 @@ impl Discretisation for VoxelModel {
             from_reaction_mpa: loaded.from_reaction(reaction),
             from_stress_mpa: loaded.from_virial(virial),
             algebraic_error_mpa: info.energy_error / info.energy * from_energy_mpa,
+        }
+    }
+
+    fn load_to_yield(
+        &self,
+        prepared: Prepared,
+        held: &Held,
+        elastic: &Displacements,
+        kept: &mut dyn Kept,
+    ) -> Result<Option<Yielded>> {
+        match self.params.plasticity {
+            None => Ok(None),
+            Some(_) => self.yielded(prepared.tissue, held, elastic, kept).map(Some),
         }
     }
 

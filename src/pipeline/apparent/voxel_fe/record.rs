@@ -4,12 +4,12 @@ use crate::grid::Grid;
 use crate::mask::resample;
 use crate::measure::apparent::EndWork;
 use crate::measure::surface_energy::{Element, SurfaceEnergy, surface_energy};
-use crate::physics::hex8::element::Integration;
 use crate::physics::hex8::fields::{Brick, Deformed, Kind};
 use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::fields::{Equilibrated, Field, FieldVolume, Place, Recorded};
 use crate::pipeline::apparent::params::{Sed, SolveParams};
 use crate::pipeline::apparent::tissue::Tissue;
+use crate::pipeline::apparent::voxel_fe::bricks::rule;
 use crate::pipeline::apparent::voxel_fe::principal::principal_fields;
 use crate::pipeline::apparent::voxel_fe::sections::{ALL, sections};
 use crate::pipeline::apparent::voxel_fe::spread::{onto, spread};
@@ -47,9 +47,9 @@ impl<'a> Recorder<'a> {
         work: &'a EndWork,
     ) -> Self {
         let kinds = match tissue {
-            Tissue::Uniform(s) => vec![(s.young_mpa, s.poisson, Integration::of(s.poisson))],
+            Tissue::Uniform(s) => vec![(s.young_mpa, s.poisson, rule(params, s.poisson))],
             Tissue::Mixed(m) => {
-                let kind = |&nu: &f64| (m.mean_mpa, nu, Integration::of(nu));
+                let kind = |&nu: &f64| (m.mean_mpa, nu, rule(params, nu));
                 m.poissons.iter().map(kind).collect()
             }
         };
@@ -77,7 +77,9 @@ impl<'a> Recorder<'a> {
         Recorded {
             fields: self.fields(scan),
             failure: table.iter().find(own).cloned(),
-            surface: self.is_uniform.then(|| self.surface()).flatten(),
+            surface: (self.is_uniform && self.solved.plastic.is_none())
+                .then(|| self.surface())
+                .flatten(),
             note: None,
             sites: None,
             details: Details {
@@ -241,6 +243,7 @@ impl<'a> Recorder<'a> {
                 principal_fields(&stress, 1.0, "principal_stress", "_mpa")
             }
             Field::NodalForce => vec![self.nodal_force()],
+            Field::PlasticStrain => vec![self.plastic_strain(scan)],
         }
     }
 
@@ -258,6 +261,18 @@ impl<'a> Recorder<'a> {
             scan.map_or_else(|| volume.clone(), |scan| onto(&volume, scan))
         };
         (0..N).map(component).collect()
+    }
+
+    /// Means over the elements.
+    fn plastic_strain(&self, scan: Option<&Volume<u8>>) -> FieldVolume {
+        let strains = self.solved.plastic.unwrap_or_default();
+        let value = |element: usize| {
+            let at = strains.binary_search_by_key(&element, |(e, _)| *e);
+            at.map_or(0.0, |at| strains[at].1)
+        };
+        let values = self.on_voxels(scan, |b| [value(b.element)]);
+        let about = "equivalent plastic strain √(2/3 ε:ε), means of elements".to_owned();
+        one("plastic_strain", values, &[], about)
     }
 
     /// Forces of the supports at the corners of the voxels.

@@ -13,7 +13,7 @@ use std::path::Path;
 pub(super) enum Fields {
     None,
     /// Along the specimen's axes, and how those follow from the file's.
-    OfVoxels(Recorded, Turn),
+    OfVoxels(Vec<FieldVolume>, Turn),
     /// Name of the lattice, values of its sites.
     OfSites(String, SiteFields),
 }
@@ -23,7 +23,7 @@ impl Fields {
     pub(super) fn of(stem: String, mut recorded: Recorded, axes: Turn) -> Fields {
         match recorded.sites.take() {
             Some(sites) => Fields::OfSites(stem, sites),
-            None => Fields::OfVoxels(recorded, axes),
+            None => Fields::OfVoxels(recorded.fields, axes),
         }
     }
 
@@ -32,7 +32,7 @@ impl Fields {
     pub(super) fn write(&self, dir: &Path) -> Result<()> {
         match self {
             Fields::None => Ok(()),
-            Fields::OfVoxels(recorded, axes) => write_voxels(dir, recorded, &axes.inverse()),
+            Fields::OfVoxels(fields, axes) => write_voxels(dir, fields, &axes.inverse()),
             Fields::OfSites(name, sites) => {
                 vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), name, sites)
             }
@@ -64,9 +64,9 @@ pub(super) fn pictures(dir: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 /// In the order and at the place of the scan's file, to which `back` leads.
-fn write_voxels(dir: &Path, recorded: &Recorded, back: &Turn) -> Result<()> {
+fn write_voxels(dir: &Path, fields: &[FieldVolume], back: &Turn) -> Result<()> {
     let mut stored = Vec::new();
-    for one in &recorded.fields {
+    for one in fields {
         let file = format!("field-{}.nii.gz", one.name.replace('_', "-"));
         let turned = |v: &Volume<f32>| orient::turned(v.clone(), back);
         let components: Vec<Volume<f32>> = one.components.iter().map(turned).collect();

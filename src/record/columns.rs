@@ -144,7 +144,7 @@ const RESULTS: [Column; 47] = [
     column(
         "structure",
         "",
-        "sc, bcc, fcc (lattices) or hex8 (voxel elements)",
+        "sc, bcc, fcc (lattices), hex8 (voxel elements) or tet10 (smooth elements)",
     ),
     column(
         "boundary",
@@ -257,7 +257,7 @@ const RESULTS: [Column; 47] = [
     column(
         "elements",
         "",
-        "what voxel elements follow from: voxels, interpolated-grey, smoothed-grey, split-voxels, block-means, bone-fractions",
+        "what elements follow from: voxels, interpolated-grey, smoothed-grey, split-voxels, block-means, bone-fractions; of geometry-fe smooth-grey (grey values) or smooth-mask (a guess)",
     ),
     column(
         "shape_error_mpa",

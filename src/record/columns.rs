@@ -240,7 +240,7 @@ const RESULTS: [Column; 61] = [
     column(
         "elements",
         "",
-        "what voxel elements follow from: voxels, interpolated-grey, smoothed-grey, split-voxels, block-means, bone-fractions",
+        "what elements follow from: voxels, interpolated-grey, smoothed-grey, split-voxels, block-means, bone-fractions; of geometry-fe smooth-grey (grey values) or smooth-mask (a guess)",
     ),
     column(
         "shape_error_mpa",

@@ -26,6 +26,7 @@ mod own_grid;
 mod patch;
 mod phantom;
 mod pipelines;
+mod plasticity;
 mod privacy;
 mod remodelling;
 mod report;

@@ -295,7 +295,12 @@ fn yielding_row(law: YieldLaw) -> Model {
     let grips = Planes::within(&bone.grid, Axis::Z, 0.0).unwrap();
     let mesh = leaked(VoxelMesh::new(bone.grid, bone.as_slice(), |b| *b != 0, grips).unwrap());
     let positions: Field = (0..mesh.len()).map(|i| mesh.position(i)).collect();
-    let bricks = leaked(Hex8::new(mesh.clone(), 1000.0, 0.3, Integration::MeanDilatation));
+    let bricks = leaked(Hex8::new(
+        mesh.clone(),
+        1000.0,
+        0.3,
+        Integration::MeanDilatation,
+    ));
     let elastic = Elastic::of(1000.0, 0.3);
     let points = || Points::new(bone.grid.spacing_mm, true);
     let mut body = PlasticBricks::new(&*bricks, &*mesh, points(), move |_| Tissue { elastic, law });
@@ -320,10 +325,17 @@ fn yielding_row(law: YieldLaw) -> Model {
         .map(|node| {
             let softened = points.strains(&corners(node, &u)).map(|e| here(&e));
             flowing += usize::from(softened.iter().any(Option::is_some));
-            (node, softened.map(|s| s.unwrap_or_default().tangent(&elastic)))
+            (
+                node,
+                softened.map(|s| s.unwrap_or_default().tangent(&elastic)),
+            )
         })
         .collect();
-    assert!(flowing > 100 && flowing < elements.len() - 100, "{flowing} of {}", elements.len());
+    assert!(
+        flowing > 100 && flowing < elements.len() - 100,
+        "{flowing} of {}",
+        elements.len()
+    );
     let energy = move |u: &[[f64; 3]]| {
         let of = |(node, tangents): &(usize, [[[f64; 6]; 6]; 8])| -> f64 {
             let strains = points.strains(&corners(*node, u));
@@ -335,7 +347,12 @@ fn yielding_row(law: YieldLaw) -> Model {
         };
         elements.iter().map(of).sum()
     };
-    Model::of(format!("tangent of {law:?}"), tangent, positions, Box::new(energy))
+    Model::of(
+        format!("tangent of {law:?}"),
+        tangent,
+        positions,
+        Box::new(energy),
+    )
 }
 
 fn models() -> Vec<Model> {

@@ -117,7 +117,9 @@ pub fn balance<B: Incremental>(
         done.newton_iterations += 1;
         done.cg_iterations += found.iterations;
         let decades = 0.5 * (found.start / found.left.max(f64::MIN_POSITIVE)).log10();
-        done.per_decade = done.per_decade.max(found.iterations as f64 / decades.max(0.1));
+        done.per_decade = done
+            .per_decade
+            .max(found.iterations as f64 / decades.max(0.1));
         done.evaluations += search(body, held, external, u, work);
     }
 }

@@ -149,7 +149,9 @@ fn assert_balanced(steps: &[Step]) {
         let off = (s.elastic_nmm + s.dissipated_nmm) / s.work_nmm - 1.0;
         assert!(off.abs() < 1e-6, "{s:?}: off by {off:e}");
     }
-    let growing = steps.windows(2).all(|w| w[1].dissipated_nmm >= w[0].dissipated_nmm);
+    let growing = steps
+        .windows(2)
+        .all(|w| w[1].dissipated_nmm >= w[0].dissipated_nmm);
     assert!(growing, "{steps:?}");
 }
 
@@ -193,7 +195,10 @@ fn a_hardening_bar_has_the_slope_of_its_tissue() {
     let (_, history) = bar.load(von_mises(68.0, 500.0), &Body::stepping(10));
     let stress = |k: usize| bar.stress(&history.steps[k], strain);
     let slope = (stress(9) - stress(5)) / (0.4 * strain);
-    assert!((slope / (1e4 * 500.0 / 10_500.0) - 1.0).abs() < 1e-5, "{slope}");
+    assert!(
+        (slope / (1e4 * 500.0 / 10_500.0) - 1.0).abs() < 1e-5,
+        "{slope}"
+    );
 }
 
 /// A bonded block that flows keeps its volume: eight dilatations an element lock it, their mean does not.
@@ -209,7 +214,10 @@ fn mean_dilatation_does_not_lock() {
         (stress(11) - stress(7)) / (4.0 / 12.0 * strain)
     };
     let (mean, full) = (slope(true), slope(false));
-    assert!(mean > 0.0 && mean < 0.2 * full, "slopes at the limit: {mean} and {full} MPa");
+    assert!(
+        mean > 0.0 && mean < 0.2 * full,
+        "slopes at the limit: {mean} and {full} MPa"
+    );
 }
 
 /// Element by element, all steps of a frame: same bits on any number of threads.
@@ -217,7 +225,10 @@ fn mean_dilatation_does_not_lock() {
 fn results_do_not_depend_on_the_number_of_threads() {
     let body = Body::block(frame(20), -0.02, true);
     let solved = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| body.load(asymmetric(50.0, 75.0), &Body::stepping(4)))
     };
     let (one, three) = (solved(1), solved(3));
@@ -232,7 +243,12 @@ fn a_history_goes_on_to_the_same_last_digit() {
     let body = Body::block(frame(14), -0.02, true);
     let law = von_mises(68.0, 0.0);
     let (_, whole) = body.load(law, &Body::stepping(5));
-    let bricks = Hex8::new(body.mesh.clone(), body.young, body.poisson, Integration::MeanDilatation);
+    let bricks = Hex8::new(
+        body.mesh.clone(),
+        body.young,
+        body.poisson,
+        Integration::MeanDilatation,
+    );
     let h = body.mesh.grid.spacing_mm;
     let multigrid = Amg::new(&bricks, &body.held, &AmgParams::new(h));
     let elastic = Elastic::of(body.young, body.poisson);
@@ -247,7 +263,14 @@ fn a_history_goes_on_to_the_same_last_digit() {
         let tissue = |_: usize| Tissue { elastic, law };
         let again = PlasticBricks::new(&bricks, &body.mesh, points, tissue);
         let go_on = |history: &History| history.steps.len() != stop_at;
-        load(again, &loading, &multigrid, &Body::stepping(5), &mut history, go_on);
+        load(
+            again,
+            &loading,
+            &multigrid,
+            &Body::stepping(5),
+            &mut history,
+            go_on,
+        );
     }
     assert_eq!(history, whole);
 }
@@ -255,7 +278,9 @@ fn a_history_goes_on_to_the_same_last_digit() {
 /// One strut of one voxel, bent by its bonded ends; near-incompressible tissue; one element 1e4 times as soft in two.
 #[test]
 fn hard_bodies_reach_the_whole_load_and_balance() {
-    let strut = mesh([9, 3, 12], 0.02, |[x, y, z]| y == 1 && (x == z / 2 + 1 || z < 2 || z > 9));
+    let strut = mesh([9, 3, 12], 0.02, |[x, y, z]| {
+        y == 1 && (x == z / 2 + 1 || z < 2 || z > 9)
+    });
     let body = Body::block(strut, -0.02, true);
     let (outcome, history) = body.load(von_mises(68.0, 0.0), &Body::stepping(10));
     assert_eq!(outcome, Outcome::Done);
@@ -281,7 +306,10 @@ fn two_phases(body: &Body) -> (Outcome, History) {
     let bricks = Heterogeneous::new(body.mesh.clone(), body.young, body.poisson, rule, factor);
     let law = von_mises(68.0, 0.0);
     let tissue = |node: usize| Tissue {
-        elastic: Elastic::of(body.young * f64::from(bricks.stiffness_of(node).0), body.poisson),
+        elastic: Elastic::of(
+            body.young * f64::from(bricks.stiffness_of(node).0),
+            body.poisson,
+        ),
         law,
     };
     let h = body.mesh.grid.spacing_mm;
@@ -307,7 +335,11 @@ fn a_step_that_fails_is_halved() {
     few.params.max_iterations = 5;
     let (outcome, cut) = body.load(law, &few);
     assert_eq!(outcome, Outcome::Done);
-    assert!(cut.steps.iter().map(|s| s.cuts).sum::<u32>() > 0, "{:?}", cut.steps);
+    assert!(
+        cut.steps.iter().map(|s| s.cuts).sum::<u32>() > 0,
+        "{:?}",
+        cut.steps
+    );
     let (_, even) = body.load(law, &Body::stepping(16));
     let last = |h: &History| h.steps.last().unwrap().conjugate_nmm;
     // Flow depends on the path, so steps of unlike length differ by a little.
@@ -366,9 +398,17 @@ fn a_cantilever_at_its_collapse_load_is_said_to_collapse() {
     let (outcome, history, body) = cantilever(15.3);
     let last = history.steps.last().unwrap();
     let tip = tip_mm(&body, &history);
-    println!("15.3 N: {outcome:?} at {:.3} N, tip {tip} mm, {} steps", 15.3 * last.load, history.steps.len());
+    println!(
+        "15.3 N: {outcome:?} at {:.3} N, tip {tip} mm, {} steps",
+        15.3 * last.load,
+        history.steps.len()
+    );
     assert_eq!(outcome, Outcome::Stopped);
-    assert!((14.5..15.3).contains(&(15.3 * last.load)), "{}", 15.3 * last.load);
+    assert!(
+        (14.5..15.3).contains(&(15.3 * last.load)),
+        "{}",
+        15.3 * last.load
+    );
     assert!(tip > 0.65, "{tip}");
 }
 
@@ -377,7 +417,12 @@ fn a_cantilever_at_its_collapse_load_is_said_to_collapse() {
 #[test]
 fn a_thick_sphere_under_pressure_flows_as_the_closed_form_says() {
     let (n, a, b, c, flow) = (32, 16.0, 32.0, 24.0, 68.0);
-    let radius = |p: [usize; 3]| p.map(|v| (v as f64 + 0.5).powi(2)).iter().sum::<f64>().sqrt();
+    let radius = |p: [usize; 3]| {
+        p.map(|v| (v as f64 + 0.5).powi(2))
+            .iter()
+            .sum::<f64>()
+            .sqrt()
+    };
     let inside = |p: [usize; 3]| radius(p) > a && radius(p) < b;
     let mut body = Body::new(mesh([n; 3], 1.0, inside), |at, axis| at[axis] == 0);
     let pressure = 2.0 * flow * ((c / a as f64).ln() + (1.0 - (c / b as f64).powi(3)) / 3.0);
@@ -390,7 +435,9 @@ fn a_thick_sphere_under_pressure_flows_as_the_closed_form_says() {
         let swell = 2.0 * (1.0 - 2.0 * nu) * r / (3.0 * b.powi(3));
         flow * c.powi(3) / body.young * (swell + (1.0 + nu) / (3.0 * r * r))
     };
-    assert!((expected(b) / (flow * (1.0 - nu) * c.powi(3) / (body.young * b * b)) - 1.0).abs() < 1e-12);
+    assert!(
+        (expected(b) / (flow * (1.0 - nu) * c.powi(3) / (body.young * b * b)) - 1.0).abs() < 1e-12
+    );
     // Nodes of the outer staircase, each at its own radius.
     let (mut sum, mut count) = (0.0, 0.0);
     for node in 0..body.mesh.len() {
@@ -446,5 +493,9 @@ fn a_specimen_that_is_split_is_no_body() {
     let grid = Grid::new([4, 4, 6], [0.02; 3]);
     let bone: Vec<u8> = (0..grid.len()).map(|i| u8::from(i / 16 != 3)).collect();
     let grips = Planes::within(&grid, Axis::Z, 0.0).unwrap();
-    assert!(VoxelMesh::new(grid, &bone, |b| *b != 0, grips).unwrap().is_empty());
+    assert!(
+        VoxelMesh::new(grid, &bone, |b| *b != 0, grips)
+            .unwrap()
+            .is_empty()
+    );
 }

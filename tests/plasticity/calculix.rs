@@ -11,13 +11,27 @@ const ORDER: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 /// Force of the moved end along z at the end of the load, N.
 fn calculix(body: &Body, strain: f64, yield_mpa: f64, hardening_mpa: f64) -> f64 {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("deck.inp"), deck(body, strain, yield_mpa, hardening_mpa)).unwrap();
-    let run = Command::new("ccx").arg("deck").current_dir(folder.path()).output();
+    std::fs::write(
+        folder.path().join("deck.inp"),
+        deck(body, strain, yield_mpa, hardening_mpa),
+    )
+    .unwrap();
+    let run = Command::new("ccx")
+        .arg("deck")
+        .current_dir(folder.path())
+        .output();
     let run = run.expect("ccx is installed");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stdout));
+    assert!(
+        run.status.success(),
+        "{}",
+        String::from_utf8_lossy(&run.stdout)
+    );
     let text = std::fs::read_to_string(folder.path().join("deck.dat")).unwrap();
     let totals = text.split("total force").last().unwrap();
-    let line = totals.lines().find(|l| l.split_whitespace().count() == 3 && !l.contains('(')).unwrap();
+    let line = totals
+        .lines()
+        .find(|l| l.split_whitespace().count() == 3 && !l.contains('('))
+        .unwrap();
     line.split_whitespace().last().unwrap().parse().unwrap()
 }
 
@@ -25,8 +39,10 @@ fn deck(body: &Body, strain: f64, yield_mpa: f64, hardening_mpa: f64) -> String 
     let (mesh, top) = (&body.mesh, body.mesh.grid.n[2]);
     let exists = |node: &usize| mesh.around[*node] != 0;
     let nodes: Vec<usize> = (0..mesh.len()).filter(exists).collect();
-    let numbers: std::collections::HashMap<[u32; 3], usize> =
-        nodes.iter().map(|&node| (mesh.indices(node), node)).collect();
+    let numbers: std::collections::HashMap<[u32; 3], usize> = nodes
+        .iter()
+        .map(|&node| (mesh.indices(node), node))
+        .collect();
     let mut out = String::from("*NODE,NSET=ALL\n");
     for node in &nodes {
         let [x, y, z] = mesh.position(*node);
@@ -41,9 +57,16 @@ fn deck(body: &Body, strain: f64, yield_mpa: f64, hardening_mpa: f64) -> String 
     }
     out += "*NSET,NSET=TOP\n";
     let ends = |node: &&usize| mesh.indices(**node)[2] as usize == top;
-    nodes.iter().filter(ends).for_each(|node| writeln!(out, "{},", node + 1).unwrap());
+    nodes
+        .iter()
+        .filter(ends)
+        .for_each(|node| writeln!(out, "{},", node + 1).unwrap());
     let (young, poisson) = (body.young, body.poisson);
-    writeln!(out, "*MATERIAL,NAME=BONE\n*ELASTIC\n{young},{poisson}\n*PLASTIC\n{yield_mpa},0.").unwrap();
+    writeln!(
+        out,
+        "*MATERIAL,NAME=BONE\n*ELASTIC\n{young},{poisson}\n*PLASTIC\n{yield_mpa},0."
+    )
+    .unwrap();
     writeln!(out, "{},1.", yield_mpa + hardening_mpa).unwrap();
     out += "*SOLID SECTION,ELSET=BONE,MATERIAL=BONE\n*STEP,INC=1000\n*STATIC\n0.1,1.,1e-4,0.1\n";
     out += "*CONTROLS,PARAMETERS=FIELD\n1e-7,1e-5\n*BOUNDARY\n";
@@ -70,7 +93,9 @@ fn the_fully_integrated_element_agrees_with_calculix() {
         };
         let theirs = calculix(&body, strain, 68.0, hardening);
         let (full, mean) = (force(false), force(true));
-        println!("{n}³ {strain}: CalculiX {theirs:.6} N, full {full:.6}, mean dilatation {mean:.6}");
+        println!(
+            "{n}³ {strain}: CalculiX {theirs:.6} N, full {full:.6}, mean dilatation {mean:.6}"
+        );
         assert!((full / theirs - 1.0).abs() < 1e-3, "{n}: {full} {theirs}");
     }
 }

@@ -20,18 +20,31 @@ fn segmented(dir: &Path) -> String {
     let grid = frame.bone.grid;
     let label = |i: usize| if i % 14 < 7 { 100.0 } else { 127.0 };
     let values = frame.bone.as_slice().iter().enumerate();
-    let values = values.map(|(i, b)| if *b != 0 { label(i) } else { 0.0 }).collect();
+    let values = values
+        .map(|(i, b)| if *b != 0 { label(i) } else { 0.0 })
+        .collect();
     let scan = dir.join("scan.nii.gz");
     nifti::write_field(&scan, &[Volume::from_vec(grid, values)], "labels").unwrap();
     let out = dir.join("out").to_str().unwrap().to_owned();
     let scan = scan.to_str().unwrap();
-    let (code, _, words) = run(&["segment", scan, "-o", &out, "--labels", "100,127", "--quiet"]);
+    let (code, _, words) = run(&[
+        "segment", scan, "-o", &out, "--labels", "100,127", "--quiet",
+    ]);
     assert_eq!(code, 0, "{words}");
     out
 }
 
 const SOLVE: [&str; 10] = [
-    "--method", "voxel-fe", "--young-mpa", "10000", "--strain", "-2%", "--ends", "bonded", "--plasticity", "von-mises:68",
+    "--method",
+    "voxel-fe",
+    "--young-mpa",
+    "10000",
+    "--strain",
+    "-2%",
+    "--ends",
+    "bonded",
+    "--plasticity",
+    "von-mises:68",
 ];
 
 fn solve(out: &str, more: &[&str]) -> (i32, String) {
@@ -55,21 +68,34 @@ fn a_solve_writes_its_row_its_curve_and_its_shares() {
         // Energies are those of the steps' ends: off by what is left unbalanced.
         let off = (p.energy_mj + p.dissipated_mj) / p.work_mj - 1.0;
         assert!(off.abs() < 1e-6, "{p:?}: {off:e}");
-        assert!(p.strain < 0.0 && p.stress_mpa < 0.0 && p.force_n < 0.0, "{p:?}");
+        assert!(
+            p.strain < 0.0 && p.stress_mpa < 0.0 && p.force_n < 0.0,
+            "{p:?}"
+        );
     }
     let rows: Vec<Row> = table::read(&Path::new(&out).join("results.csv")).unwrap();
     let solved = rows[0].solved.as_ref().unwrap();
     let strength = solved.strength;
     let most = points.iter().map(|p| -p.stress_mpa).fold(0.0, f64::max);
     assert_eq!(strength.max_stress_mpa, Some(most));
-    let (stress, strain) = (strength.yield_stress_mpa.unwrap(), strength.yield_strain.unwrap());
+    let (stress, strain) = (
+        strength.yield_stress_mpa.unwrap(),
+        strength.yield_strain.unwrap(),
+    );
     let modulus = solved.e_app_mpa.unwrap();
     assert!((stress / (modulus * (strain - 0.002)) - 1.0).abs() < 1e-9);
     assert_eq!(solved.force_n, Some(-points[7].force_n));
     assert_eq!(rows[0].key.plasticity.as_deref(), Some("von-mises:68"));
     let shares = std::fs::read_to_string(Path::new(&out).join("yielded.csv")).unwrap();
-    assert!(["all", ",100,", ",127,"].iter().all(|l| shares.contains(l)), "{shares}");
-    assert!(Path::new(&out).join("field-plastic-strain.nii.gz").is_file());
+    assert!(
+        ["all", ",100,", ",127,"].iter().all(|l| shares.contains(l)),
+        "{shares}"
+    );
+    assert!(
+        Path::new(&out)
+            .join("field-plastic-strain.nii.gz")
+            .is_file()
+    );
     assert!(!Path::new(&out).join("load-steps.bin").exists());
 }
 
@@ -93,7 +119,10 @@ fn one_law_a_label_and_a_label_without_one() {
     assert_eq!(laws("labels:100=von-mises:68,127=von-mises:1000").0, 0);
     assert!(curve(&out)[2].stress_mpa < one[2].stress_mpa);
     let (code, words) = laws("labels:100=von-mises:68");
-    assert!(code == 2 && words.contains("label 127 has no law"), "{words}");
+    assert!(
+        code == 2 && words.contains("label 127 has no law"),
+        "{words}"
+    );
 }
 
 #[test]
@@ -101,10 +130,16 @@ fn what_cannot_yield_is_refused_in_words() {
     let dir = tempfile::tempdir().unwrap();
     let out = segmented(dir.path());
     for (flags, expected) in [
-        (&["--method", "lattice", "--plasticity", "von-mises:68"][..], "bonds of a lattice"),
+        (
+            &["--method", "lattice", "--plasticity", "von-mises:68"][..],
+            "bonds of a lattice",
+        ),
         (&["--load", "torsion"], "no stress-strain curve"),
         (&["--load", "stiffness"], "no stress-strain curve"),
-        (&["--coarsen", "2", "--coarsen-by", "fraction"], "no yield stress of their own"),
+        (
+            &["--coarsen", "2", "--coarsen-by", "fraction"],
+            "no yield stress of their own",
+        ),
         (&["--failure"], "Pistoia"),
         (&["--fields", "sed"], "elastic tissue only"),
         (&["--plasticity", "von-mises:0"], "above 0 MPa"),
@@ -137,10 +172,20 @@ fn a_bar_of_voxels_yields_at_its_yield_stress() {
         }))),
         ..SolveParams::default()
     };
-    let solved = of_voxels().solve_specimen(&bar, &params, &mut |_, _| ()).unwrap();
-    let JobResult::Modulus(solved, _) = solved else { unreachable!("one load") };
+    let solved = of_voxels()
+        .solve_specimen(&bar, &params, &mut |_, _| ())
+        .unwrap();
+    let JobResult::Modulus(solved, _) = solved else {
+        unreachable!("one load")
+    };
     let row = solved.row(Row::default());
     let strength = row.solved.unwrap().strength;
-    assert!((strength.max_stress_mpa.unwrap() / 68.0 - 1.0).abs() < 1e-6, "{strength:?}");
-    assert!((strength.yield_stress_mpa.unwrap() / 68.0 - 1.0).abs() < 1e-6, "{strength:?}");
+    assert!(
+        (strength.max_stress_mpa.unwrap() / 68.0 - 1.0).abs() < 1e-6,
+        "{strength:?}"
+    );
+    assert!(
+        (strength.yield_stress_mpa.unwrap() / 68.0 - 1.0).abs() < 1e-6,
+        "{strength:?}"
+    );
 }

@@ -26,7 +26,12 @@ fn asymmetric(hardening_mpa: f64) -> YieldLaw {
 }
 
 fn laws() -> [YieldLaw; 4] {
-    [von_mises(0.0), von_mises(500.0), asymmetric(0.0), asymmetric(500.0)]
+    [
+        von_mises(0.0),
+        von_mises(500.0),
+        asymmetric(0.0),
+        asymmetric(500.0),
+    ]
 }
 
 /// Strains of all kinds, some beyond the tip of a cone, and a state that has flowed.
@@ -43,11 +48,15 @@ fn cases() -> Vec<(Tensor, Point)> {
         [0.0005, 0.0, 0.0, 0.0, 0.0, 0.0],
     ];
     let each = strains.into_iter();
-    each.flat_map(|e| [(e, Point::default()), (e, flowed)]).collect()
+    each.flat_map(|e| [(e, Point::default()), (e, flowed)])
+        .collect()
 }
 
 fn tangent(response: &Response) -> [Tensor; 6] {
-    response.softening.unwrap_or_else(Softening::default).tangent(&elastic())
+    response
+        .softening
+        .unwrap_or_else(Softening::default)
+        .tangent(&elastic())
 }
 
 #[test]
@@ -125,12 +134,14 @@ fn rod(law: &YieldLaw, ends: &[f64]) -> Vec<f64> {
 
 #[test]
 fn both_uniaxial_yield_stresses_are_exact() {
-    for (law, tension, compression) in
-        [(von_mises(0.0), 68.0, 68.0), (asymmetric(0.0), 50.0, 75.0)]
+    for (law, tension, compression) in [(von_mises(0.0), 68.0, 68.0), (asymmetric(0.0), 50.0, 75.0)]
     {
         for (sign, expected) in [(1.0, tension), (-1.0, compression)] {
             let last = *rod(&law, &[sign * 0.02]).last().unwrap();
-            assert!((last - sign * expected).abs() < 1e-6 * expected, "{law:?}: {last}");
+            assert!(
+                (last - sign * expected).abs() < 1e-6 * expected,
+                "{law:?}: {last}"
+            );
         }
     }
 }
@@ -142,7 +153,11 @@ fn hardening_has_its_slope_and_unloading_is_elastic() {
         let stresses = rod(&law, &[-0.02, -0.018]);
         let slope = YOUNG * 500.0 / (YOUNG + 500.0);
         let expected = -first - slope * (0.02 - first / YOUNG);
-        assert!((stresses[39] - expected).abs() < 1e-6 * first, "{law:?}: {}", stresses[39]);
+        assert!(
+            (stresses[39] - expected).abs() < 1e-6 * first,
+            "{law:?}: {}",
+            stresses[39]
+        );
         let back = (stresses[79] - stresses[39]) / 0.002;
         assert!((back - YOUNG).abs() < 1e-6 * YOUNG, "{law:?}: {back}");
     }

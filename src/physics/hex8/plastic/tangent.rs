@@ -34,7 +34,10 @@ impl<'a, E: Coarsen, K: Scalar> Tangent<'a, E, K> {
         Tangent {
             elastic,
             mesh,
-            couplings: flowing.par_iter().map(|y| points.couplings(&y.softening)).collect(),
+            couplings: flowing
+                .par_iter()
+                .map(|y| points.couplings(&y.softening))
+                .collect(),
             slots,
         }
     }
@@ -53,27 +56,36 @@ impl<'a, E: Coarsen, K: Scalar> Tangent<'a, E, K> {
         if self.couplings.is_empty() {
             return;
         }
-        each_yielded(self.mesh, &self.slots, nodes.clone(), |node, own, slot, rows, i| {
-            let (k, here) = (&self.couplings[slot], x[node]);
-            let mut sum = [0.0; 3];
-            for other in 0..8 {
-                if other == own {
-                    continue;
-                }
-                let there = x[neighbour(rows, i, own, other)];
-                let d: [f64; 3] = std::array::from_fn(|a| (there[a] - here[a]).into());
-                let (low, high) = (own.min(other), own.max(other));
-                let block = &k[9 * pair(low, high)..][..9];
-                for a in 0..3 {
-                    for b in 0..3 {
-                        let entry = if own < other { block[3 * a + b] } else { block[3 * b + a] };
-                        sum[a] += entry.into() * d[b];
+        each_yielded(
+            self.mesh,
+            &self.slots,
+            nodes.clone(),
+            |node, own, slot, rows, i| {
+                let (k, here) = (&self.couplings[slot], x[node]);
+                let mut sum = [0.0; 3];
+                for other in 0..8 {
+                    if other == own {
+                        continue;
+                    }
+                    let there = x[neighbour(rows, i, own, other)];
+                    let d: [f64; 3] = std::array::from_fn(|a| (there[a] - here[a]).into());
+                    let (low, high) = (own.min(other), own.max(other));
+                    let block = &k[9 * pair(low, high)..][..9];
+                    for a in 0..3 {
+                        for b in 0..3 {
+                            let entry = if own < other {
+                                block[3 * a + b]
+                            } else {
+                                block[3 * b + a]
+                            };
+                            sum[a] += entry.into() * d[b];
+                        }
                     }
                 }
-            }
-            let y = &mut y[node - nodes.start];
-            (0..3).for_each(|a| y[a] += S::of(sum[a]));
-        });
+                let y = &mut y[node - nodes.start];
+                (0..3).for_each(|a| y[a] += S::of(sum[a]));
+            },
+        );
     }
 }
 
@@ -96,10 +108,15 @@ impl<E: Coarsen, K: Scalar> Operator<3> for Tangent<'_, E, K> {
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
         self.elastic.diagonal(d);
-        each_yielded(self.mesh, &self.slots, 0..d.len(), |node, own, slot, _, _| {
-            let block = own_block(&self.couplings[slot], own);
-            (0..3).for_each(|a| d[node][a] += block[a][a]);
-        });
+        each_yielded(
+            self.mesh,
+            &self.slots,
+            0..d.len(),
+            |node, own, slot, _, _| {
+                let block = own_block(&self.couplings[slot], own);
+                (0..3).for_each(|a| d[node][a] += block[a][a]);
+            },
+        );
     }
 }
 
@@ -110,7 +127,11 @@ fn own_block<K: Scalar>(k: &Couplings<K>, own: usize) -> [[f64; 3]; 3] {
         let block = &k[9 * pair(own.min(other), own.max(other))..][..9];
         for a in 0..3 {
             for b in 0..3 {
-                let entry = if own < other { block[3 * a + b] } else { block[3 * b + a] };
+                let entry = if own < other {
+                    block[3 * a + b]
+                } else {
+                    block[3 * b + a]
+                };
                 sum[a][b] -= entry.into();
             }
         }

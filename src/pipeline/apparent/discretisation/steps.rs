@@ -98,7 +98,9 @@ impl History {
                 false => self.u[i][a] + share * (self.u[i][a] - self.before[i][a]),
             },
         };
-        (0..self.u.len()).map(|i| std::array::from_fn(|a| at(i, a))).collect()
+        (0..self.u.len())
+            .map(|i| std::array::from_fn(|a| at(i, a)))
+            .collect()
     }
 }
 
@@ -123,8 +125,9 @@ pub fn load<E: Coarsen, T: Fn(usize) -> Tissue + Sync>(
             load => load,
         };
         let mut u = history.guess(loading, load);
-        let outside: Option<Vec<[f64; 3]>> =
-            loading.external.map(|f| f.iter().map(|f| f.map(|v| load * v)).collect());
+        let outside: Option<Vec<[f64; 3]>> = loading
+            .external
+            .map(|f| f.iter().map(|f| f.map(|v| load * v)).collect());
         let found = balance(
             &mut body,
             loading.held,

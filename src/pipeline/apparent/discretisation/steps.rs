@@ -4,7 +4,7 @@ use crate::operator::SinglePreconditioner;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::physics::hex8::plastic::{Balance, PlasticBricks, State, Tissue};
-use crate::solver::load_step::{Balanced, StepParams, Workspace, balance, work_between};
+use crate::solver::load_step::{Balanced, Bounds, StepParams, Workspace, balance, work_between};
 
 /// Supports and load. The load grows from 0 to 1.
 pub struct Loading<'a> {
@@ -130,10 +130,12 @@ pub fn load<E: Coarsen, T: Fn(usize) -> Tissue + Sync>(
             .map(|f| f.iter().map(|f| f.map(|v| load * v)).collect());
         let found = balance(
             &mut body,
-            loading.held,
+            &Bounds {
+                held: loading.held,
+                external: outside.as_deref(),
+                from: &history.u,
+            },
             preconditioner,
-            outside.as_deref(),
-            &history.u,
             &mut u,
             &how.params,
             &mut work,

@@ -67,10 +67,7 @@ fn cantilever(force_n: f64) -> (Outcome, History, Body) {
         }
     }
     body.forces = Some(forces);
-    let mut how = Body::stepping(14);
-    // Slender: the preconditioner's energy of a residual is a fifth of the true one or less.
-    how.params.tolerance = 1e-14;
-    let (outcome, history) = body.load(von_mises(120.0, 0.0), &how);
+    let (outcome, history) = body.load(von_mises(120.0, 0.0), &Body::stepping(14));
     (outcome, history, body)
 }
 
@@ -94,26 +91,24 @@ fn a_cantilever_bends_as_beam_theory_says() {
     }
 }
 
-/// 15 N is the collapse load `σ_y b h² / (4 L)` itself: the tip moves without bound, by beam theory 0.889 mm when the hinge has
-/// formed. Any value that a program prints there is that of its last step and mesh (Faim: 0.756 mm); steps end below or far beyond
-/// the deflection at 14 N.
+/// 15 N is the collapse load `σ_y b h² / (4 L)` of beam theory: there the tip moves without bound. Here the clamp also holds the root's
+/// height, which makes its surroundings stronger, so the hinge forms some millimetres from it and the arm is shorter: at 15 N the tip is where
+/// Faim has it, between the 14 N value and 0.889 mm, and no equilibrium is found a few percent above.
 #[test]
-fn a_cantilever_at_its_collapse_load_is_said_to_collapse() {
-    let (outcome, history, body) = cantilever(15.3);
-    let last = history.steps.last().unwrap();
+fn a_cantilever_collapses_just_above_its_collapse_load() {
+    let (outcome, history, body) = cantilever(15.0);
+    assert_eq!(outcome, Outcome::Done);
     let tip = tip_mm(&body, &history);
+    println!("15 N: tip {tip} mm");
+    assert!((0.7..0.889).contains(&tip), "{tip}");
+    let (outcome, history, body) = cantilever(18.0);
+    let reached = 18.0 * history.steps.last().unwrap().load;
     println!(
-        "15.3 N: {outcome:?} at {:.3} N, tip {tip} mm, {} steps",
-        15.3 * last.load,
-        history.steps.len()
+        "18 N: {outcome:?} at {reached} N, tip {} mm",
+        tip_mm(&body, &history)
     );
     assert_eq!(outcome, Outcome::Stopped);
-    assert!(
-        (14.5..15.3).contains(&(15.3 * last.load)),
-        "{}",
-        15.3 * last.load
-    );
-    assert!(tip > 0.65, "{tip}");
+    assert!((15.0..16.5).contains(&reached), "{reached}");
 }
 
 /// A thick sphere of perfect tissue under inner pressure (Hill 1950, ch. V): with the plastic front at `c` the pressure is

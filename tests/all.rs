@@ -29,6 +29,7 @@ mod own_grid;
 mod patch;
 mod phantom;
 mod pipelines;
+mod plasticity;
 mod privacy;
 mod remodelling;
 mod report;

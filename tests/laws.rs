@@ -11,15 +11,22 @@ use bonepd_ct::discretisation::voxels::{Planes, VoxelMesh};
 use bonepd_ct::grid::{Axis, Grid};
 use bonepd_ct::operator::coarsen::Coarsen;
 use bonepd_ct::operator::held::{Constrained, Held};
+use bonepd_ct::operator::nonlinear::Incremental;
 use bonepd_ct::operator::{MixedPrecision, Operator};
 use bonepd_ct::par::dot;
 use bonepd_ct::physics::hex8::Hex8;
 use bonepd_ct::physics::hex8::element::{ElementMatrix, Integration, stiffness};
 use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
+use bonepd_ct::physics::hex8::plastic::points::Points;
+use bonepd_ct::physics::hex8::plastic::{PlasticBricks, Tissue};
 use bonepd_ct::physics::lattice::connected::{ConnectedLattice, ConnectedSprings};
 use bonepd_ct::physics::lattice::multigrid::Springs;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
+<<<<<<< HEAD
 use bonepd_ct::physics::tet10::Tet10;
+=======
+use bonepd_ct::physics::plasticity::{DruckerPrager, Elastic, VonMises, YieldLaw};
+>>>>>>> plastic
 use bonepd_ct::pipeline::lattice::{
     Boundary, Case, Structure, build_connected, build_of, site_values,
 };
@@ -275,6 +282,7 @@ fn heterogeneous_row(kinds: &'static [(f64, Integration)]) -> Model {
     )
 }
 
+<<<<<<< HEAD
 /// Smooth elements in the irregular specimen; their energy is summed over the points of a Gauss rule from the shape functions.
 fn tet10_row(poisson: f64, mixed: bool) -> Model {
     let bone = irregular_specimen().bone;
@@ -350,6 +358,87 @@ fn gauss_energy(at: [[f64; 3]; 10], u: [[f64; 3]; 10], poisson: f64) -> f64 {
         determinant / 24.0 * (0.5 * lambda * trace * trace + mu * squares)
     };
     (0..4).map(point).sum()
+=======
+fn von_mises() -> YieldLaw {
+    YieldLaw::VonMises(VonMises {
+        yield_mpa: 1.0,
+        hardening_mpa: 20.0,
+    })
+}
+
+fn asymmetric() -> YieldLaw {
+    YieldLaw::Asymmetric(DruckerPrager {
+        tension_mpa: 1.0,
+        compression_mpa: 1.5,
+        hardening_mpa: 20.0,
+    })
+}
+
+/// The tangent of elements of which some flow. Its energy is summed point by point from the law's own tangent.
+fn yielding_row(law: YieldLaw) -> Model {
+    let bone = irregular_specimen().bone;
+    let grips = Planes::within(&bone.grid, Axis::Z, 0.0).unwrap();
+    let mesh = leaked(VoxelMesh::new(bone.grid, bone.as_slice(), |b| *b != 0, grips).unwrap());
+    let positions: Field = (0..mesh.len()).map(|i| mesh.position(i)).collect();
+    let bricks = leaked(Hex8::new(
+        mesh.clone(),
+        1000.0,
+        0.3,
+        Integration::MeanDilatation,
+    ));
+    let elastic = Elastic::of(1000.0, 0.3);
+    let points = || Points::new(bone.grid.spacing_mm, true);
+    let mut body = PlasticBricks::new(&*bricks, &*mesh, points(), move |_| Tissue { elastic, law });
+    // Strained unevenly, so that elements of one end flow and those of the other do not.
+    let strained = |x: &[f64; 3]| [1e-4 * x[0], 2e-3 * x[1] * x[2], 8e-3 * x[2] * x[2] / 0.2];
+    let u: Field = positions.iter().map(strained).collect();
+    body.forces(&u, &mut vec![[0.0; 3]; u.len()]);
+    let tangent = leaked(body.tangent_in::<f64>());
+    let numbers: HashMap<[u32; 3], usize> = (0..mesh.len())
+        .filter(|&i| mesh.around[i] != 0)
+        .map(|i| (mesh.indices(i), i))
+        .collect();
+    let corners = move |node: usize, u: &[[f64; 3]]| -> [[f64; 3]; 8] {
+        let at = mesh.indices(node);
+        std::array::from_fn(|c| u[numbers[&std::array::from_fn(|a| at[a] + (c as u32 >> a & 1))]])
+    };
+    let points = points();
+    let here = |strain: &[f64; 6]| law.respond(&elastic, strain, &Default::default()).softening;
+    let mut flowing = 0;
+    let elements: Vec<(usize, [[[f64; 6]; 6]; 8])> = (0..mesh.len())
+        .filter(|&node| mesh.has_element(node))
+        .map(|node| {
+            let softened = points.strains(&corners(node, &u)).map(|e| here(&e));
+            flowing += usize::from(softened.iter().any(Option::is_some));
+            (
+                node,
+                softened.map(|s| s.unwrap_or_default().tangent(&elastic)),
+            )
+        })
+        .collect();
+    assert!(
+        flowing > 100 && flowing < elements.len() - 100,
+        "{flowing} of {}",
+        elements.len()
+    );
+    let energy = move |u: &[[f64; 3]]| {
+        let of = |(node, tangents): &(usize, [[[f64; 6]; 6]; 8])| -> f64 {
+            let strains = points.strains(&corners(*node, u));
+            let twice = strains.iter().zip(tangents).map(|(e, t)| {
+                let stress = t.map(|row| row.iter().zip(e).map(|(a, b)| a * b).sum::<f64>());
+                stress.iter().zip(e).map(|(s, e)| s * e).sum::<f64>()
+            });
+            0.5 * points.weight() * twice.sum::<f64>()
+        };
+        elements.iter().map(of).sum()
+    };
+    Model::of(
+        format!("tangent of {law:?}"),
+        tangent,
+        positions,
+        Box::new(energy),
+    )
+>>>>>>> plastic
 }
 
 fn models() -> Vec<Model> {
@@ -360,6 +449,8 @@ fn models() -> Vec<Model> {
         heterogeneous_row(&[(0.3, Full)]),
         heterogeneous_row(&[(0.3, Full), (0.49, MeanDilatation)]),
         connected_springs_row(),
+        yielding_row(von_mises()),
+        yielding_row(asymmetric()),
     ];
     for structure in Structure::ALL {
         let by_bone = match structure {

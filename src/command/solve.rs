@@ -182,13 +182,13 @@ impl OpenScan {
                 session.result(line);
             }
             // The row first: fields that cannot be written do not cost it.
-            let curve = match is_kept {
-                true => self.results.details(blank, params).curve,
-                false => details.curve.clone(),
+            let details = match is_kept {
+                true => self.results.details(blank, params),
+                false => details,
             };
-            if !is_kept {
-                self.results.store(blank, params, &row, details)?;
-            }
+            let curve = details.curve.clone();
+            // A row that was kept too: what was measured of the bone may be new.
+            self.results.store(blank, params, &row, details)?;
             if !curve.is_empty() {
                 details::write_curve(&self.dir, &curve)?;
                 kept_steps::forget(&self.dir);

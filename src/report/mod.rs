@@ -266,7 +266,7 @@ mod tests {
 
     fn report_of(rows: &[Row]) -> Report {
         let answers = answers::answers(rows, |_| ScanFacts::default());
-        report(rows, answers, &ReportParams::default())
+        report(rows, answers, &[], &ReportParams::default())
     }
 
     fn row(scan: &str, boundary: BoundaryRule, lp_mm: f64, e: f64) -> Row {

@@ -68,7 +68,9 @@ pub fn strength(curve: &[CurvePoint], modulus_mpa: f64) -> Strength {
         .into_iter()
         .chain(curve.iter().map(|p| [p.strain.abs(), p.stress_mpa.abs()]))
         .collect();
-    let crossing = points.windows(2).find(|w| excess(&w[0]) > 0.0 && excess(&w[1]) <= 0.0);
+    let crossing = points
+        .windows(2)
+        .find(|w| excess(&w[0]) > 0.0 && excess(&w[1]) <= 0.0);
     let at = crossing.map(|w| {
         let share = excess(&w[0]) / (excess(&w[0]) - excess(&w[1]));
         [0, 1].map(|i| w[0][i] + share * (w[1][i] - w[0][i]))

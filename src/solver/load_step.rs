@@ -18,13 +18,21 @@ pub struct StepParams {
     pub max_cg_iterations: usize,
 }
 
+/// Where a step begins, and what the body is held and pushed by at its end.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds<'a> {
+    pub held: &'a Held,
+    /// N; None where there are none.
+    pub external: Option<&'a [[f64; 3]]>,
+    /// Displacements at the start of the step.
+    pub from: &'a [[f64; 3]],
+}
+
 /// What a step took.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Balanced {
     pub newton_iterations: usize,
     pub cg_iterations: usize,
-    /// Most iterations that one correction took per decade of its error.
-    pub per_decade: f64,
     /// Looks at the forces.
     pub evaluations: usize,
     /// Squared energy norm of what is left.
@@ -61,29 +69,27 @@ impl Workspace {
     }
 }
 
-/// Finds displacements `u` whose forces balance `external` on the components that are not held, from a guess that meets the supports.
-/// `from` are those at the start of the step.
+/// Finds displacements `u` whose forces balance the external ones on the components that are not held, from a guess that meets the
+/// supports.
 ///
 /// # Errors
 /// Iterations that do not converge.
 pub fn balance<B: Incremental>(
     body: &mut B,
-    held: &Held,
+    bounds: &Bounds,
     preconditioner: &impl SinglePreconditioner<3>,
-    external: Option<&[[f64; 3]]>,
-    from: &[[f64; 3]],
     u: &mut [[f64; 3]],
     params: &StepParams,
     work: &mut Workspace,
 ) -> Result<Balanced, NotConverged> {
     let mut done = Balanced::default();
-    unbalanced(body, held, external, u, work);
+    unbalanced(body, bounds, u, work);
     done.evaluations = 1;
     let mut earlier = f64::INFINITY;
     let mut grown = 0;
     loop {
         let energy = correction::energy(preconditioner, &work.residual, &mut work.room);
-        let enough = params.tolerance * scale(&work.forces, from, u);
+        let enough = params.tolerance * work_between(&work.forces, bounds.from, u).abs();
         done.left = energy;
         if energy <= enough {
             return Ok(done);
@@ -103,7 +109,7 @@ pub fn balance<B: Incremental>(
         };
         let found = correction::solve(
             &tangent,
-            held,
+            bounds.held,
             preconditioner,
             &work.residual,
             &mut work.update,
@@ -116,35 +122,26 @@ pub fn balance<B: Incremental>(
         }
         done.newton_iterations += 1;
         done.cg_iterations += found.iterations;
-        let decades = 0.5 * (found.start / found.left.max(f64::MIN_POSITIVE)).log10();
-        done.per_decade = done.per_decade.max(found.iterations as f64 / decades.max(0.1));
-        done.evaluations += search(body, held, external, u, work);
+        done.evaluations += search(body, bounds, u, work);
     }
-}
-
-/// Work of the step.
-fn scale(forces: &[[f64; 3]], from: &[[f64; 3]], u: &[[f64; 3]]) -> f64 {
-    work_between(forces, from, u).abs()
 }
 
 /// `f · (u − from)`.
 pub fn work_between(f: &[[f64; 3]], from: &[[f64; 3]], u: &[[f64; 3]]) -> f64 {
     crate::par::sum_chunks(f.len(), |range| {
-        let mut sum = 0.0;
-        for i in range {
-            for a in 0..3 {
-                sum += f[i][a] * (u[i][a] - from[i][a]);
-            }
-        }
-        sum
+        let moved = u[range.clone()].iter().zip(&from[range.clone()]);
+        let each = f[range].iter().zip(moved);
+        each.map(|(f, (u, from))| {
+            f[0] * (u[0] - from[0]) + f[1] * (u[1] - from[1]) + f[2] * (u[2] - from[2])
+        })
+        .sum()
     })
 }
 
 /// Adds the update to `u`, or as much of it as the forces let; returns the looks at the forces.
 fn search<B: Incremental>(
     body: &mut B,
-    held: &Held,
-    external: Option<&[[f64; 3]]>,
+    bounds: &Bounds,
     u: &mut [[f64; 3]],
     work: &mut Workspace,
 ) -> usize {
@@ -152,7 +149,7 @@ fn search<B: Incremental>(
     let mut share = 1.0;
     add(u, &work.update, share);
     for tries in 1.. {
-        unbalanced(body, held, external, u, work);
+        unbalanced(body, bounds, u, work);
         let slope = dot(&work.residual, &work.update);
         // A negative slope is beyond the least energy; a positive one, before it, is for Newton's next iteration.
         if slope >= -OVERSHOT * start.abs() || tries == TRIES || !slope.is_finite() {
@@ -175,21 +172,15 @@ fn add(u: &mut [[f64; 3]], update: &[[f64; 3]], share: f64) {
 }
 
 /// What external forces leave over the body's, in the components that are not held.
-fn unbalanced<B: Incremental>(
-    body: &mut B,
-    held: &Held,
-    external: Option<&[[f64; 3]]>,
-    u: &[[f64; 3]],
-    work: &mut Workspace,
-) {
+fn unbalanced<B: Incremental>(body: &mut B, bounds: &Bounds, u: &[[f64; 3]], work: &mut Workspace) {
     body.forces(u, &mut work.forces);
     let forces = &work.forces;
     each_chunk(&mut work.residual, CHUNK, |first, r| {
         for (i, r) in r.iter_mut().enumerate() {
-            let outside = external.map_or([0.0; 3], |e| e[first + i]);
+            let outside = bounds.external.map_or([0.0; 3], |e| e[first + i]);
             *r = std::array::from_fn(|a| outside[a] - forces[first + i][a]);
         }
         [0.0]
     });
-    held.clear(&mut work.residual);
+    bounds.held.clear(&mut work.residual);
 }

@@ -51,7 +51,9 @@ impl Kept for KeptSteps<'_> {
         };
         let history = history(&state)?;
         let steps = history.steps.len();
-        self.session.say(format!("note: {steps} load steps were solved before: going on from there"));
+        self.session.say(format!(
+            "note: {steps} load steps were solved before: going on from there"
+        ));
         Some(history)
     }
 

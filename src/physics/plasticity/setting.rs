@@ -47,10 +47,7 @@ impl Plasticity {
             }
         };
         match laws.iter().find_map(YieldLaw::wrong) {
-            Some(words) => wrong(
-                format!("not usable: {}", self.words()),
-                words,
-            ),
+            Some(words) => wrong(format!("not usable: {}", self.words()), words),
             None => Ok(()),
         }
     }
@@ -60,7 +57,9 @@ impl Plasticity {
         match self {
             Plasticity::All(law) => law.words(),
             Plasticity::Labels(labels) => {
-                let each = labels.iter().map(|l| format!("{}={}", l.value, l.law.words()));
+                let each = labels
+                    .iter()
+                    .map(|l| format!("{}={}", l.value, l.law.words()));
                 format!("labels:{}", each.collect::<Vec<_>>().join(","))
             }
         }
@@ -77,7 +76,9 @@ impl YieldLaw {
                 law.hardening_mpa,
             ),
         };
-        let all = numbers.into_iter().chain((hardening != 0.0).then_some(hardening));
+        let all = numbers
+            .into_iter()
+            .chain((hardening != 0.0).then_some(hardening));
         let all: Vec<String> = all.map(|v| v.to_string()).collect();
         format!("{name}:{}", all.join(","))
     }

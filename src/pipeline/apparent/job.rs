@@ -3,10 +3,10 @@
 use crate::discretisation::voxels::{self, Planes};
 use crate::error::{Error, Result};
 use crate::operator::{Functional, MixedPrecision, Operator};
+use crate::pipeline::apparent::discretisation::yielded::{Kept, NotKept};
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, Prepared, System,
 };
-use crate::pipeline::apparent::discretisation::yielded::{Kept, NotKept};
 use crate::pipeline::apparent::equilibrium::{Observe, equilibrium};
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::mechanisms::mechanisms;
@@ -16,6 +16,7 @@ use crate::pipeline::apparent::solved::{Moduli, Solved};
 use crate::pipeline::apparent::stiffness::{Stiffness, stiffness};
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::result::settings::{Motion, Settings};
+use crate::solver::cg::Ended;
 use crate::volume::Specimen;
 use std::ops::Deref;
 
@@ -154,9 +155,12 @@ impl<D: Discretisation> Solve for Of<D> {
             _ => Moduli::NONE,
         };
         let mut work = motion.work(&moduli, &info);
-        let yielded = match info.ended.converged() {
-            true => model.load_to_yield(prepared, &system.held, &u, kept)?,
-            false => None,
+        // A mechanism bears nothing that could yield.
+        let yielded = match info.ended {
+            Ended::EnergyTolerance | Ended::ResidualTolerance => {
+                model.load_to_yield(prepared, &system.held, &u, kept)?
+            }
+            _ => None,
         };
         let end = match &yielded {
             None => elastic,

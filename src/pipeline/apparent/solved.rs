@@ -152,10 +152,9 @@ impl Solved {
             force_n: of_force(self.work.force_n),
             moment_nmm: self.work.moment_nmm.filter(|v| by_angle && v.is_finite()),
             mechanisms: self.mechanisms.map(|n| n as u64),
-            strength: self
-                .yielding
-                .as_ref()
-                .map_or_else(Strength::default, |y| strength(&y.curve, self.slope(&blank.key))),
+            strength: self.yielding.as_ref().map_or_else(Strength::default, |y| {
+                strength(&y.curve, self.slope(&blank.key))
+            }),
             ..Solution::default()
         };
         Row {

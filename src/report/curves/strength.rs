@@ -7,8 +7,14 @@ use crate::result::strength::CurvePoint;
 pub fn stress_strain(scan: &str, curve: &[CurvePoint]) -> Option<Figure> {
     let last = curve.last()?;
     let of = |p: &CurvePoint| Point::new(100.0 * p.strain.abs(), p.stress_mpa.abs());
-    let points = [Point::new(0.0, 0.0)].into_iter().chain(curve.iter().map(of));
-    let loaded = if last.strain < 0.0 { "compression" } else { "tension or shear" };
+    let points = [Point::new(0.0, 0.0)]
+        .into_iter()
+        .chain(curve.iter().map(of));
+    let loaded = if last.strain < 0.0 {
+        "compression"
+    } else {
+        "tension or shear"
+    };
     Some(Figure {
         stem: format!("stress-strain-{scan}"),
         scan: Some(scan.to_owned()),

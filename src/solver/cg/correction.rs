@@ -47,7 +47,11 @@ impl Room {
 }
 
 /// `bᵀ M⁻¹ b` of a right-hand side `b`, which is zero in held components: its squared energy. 0 where it is nothing.
-pub fn energy(preconditioner: &impl SinglePreconditioner<3>, b: &[[f64; 3]], room: &mut Room) -> f64 {
+pub fn energy(
+    preconditioner: &impl SinglePreconditioner<3>,
+    b: &[[f64; 3]],
+    room: &mut Room,
+) -> f64 {
     let unit = norm(b);
     if unit == 0.0 {
         return 0.0;
@@ -81,7 +85,11 @@ pub fn solve(
     let enough = (params.reduction * start).max(params.enough);
     let (mut rz, mut rz_before) = (start / scale, 1.0);
     while !done.broke_down && done.left > enough && done.iterations < params.max_iterations {
-        let beta = if done.iterations == 0 { 0.0 } else { rz / rz_before };
+        let beta = if done.iterations == 0 {
+            0.0
+        } else {
+            rz / rz_before
+        };
         combine(p, z, beta as f32);
         let curvature = image(operator, held, p, z);
         if !(curvature > 0.0 && curvature.is_finite()) {
@@ -109,7 +117,13 @@ fn norm(b: &[[f64; 3]]) -> f64 {
 const ROUNDING: f64 = 1e-15;
 
 fn narrow(b: &[[f64; 3]], unit: f64, r: &mut [[f32; 3]]) {
-    let single = |v: f64| if (v / unit).abs() > ROUNDING { (v / unit) as f32 } else { 0.0 };
+    let single = |v: f64| {
+        if (v / unit).abs() > ROUNDING {
+            (v / unit) as f32
+        } else {
+            0.0
+        }
+    };
     each_chunk(r, CHUNK, |first, r| {
         for (r, b) in r.iter_mut().zip(&b[first..]) {
             *r = b.map(single);

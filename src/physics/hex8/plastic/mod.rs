@@ -119,12 +119,13 @@ impl<'a, E: Coarsen, T: Fn(usize) -> Tissue + Sync> PlasticBricks<'a, E, T> {
     fn energies(&self, y: &Yielded, from: &[[f64; 3]], u: &[[f64; 3]]) -> [f64; 2] {
         let node = y.state.node as usize;
         let Tissue { elastic, .. } = (self.tissue)(node);
-        let earlier = self.state_of(node).map_or([Point::default(); 8], |s| s.points);
+        let earlier = self
+            .state_of(node)
+            .map_or([Point::default(); 8], |s| s.points);
         let stress = |u: &[[f64; 3]], points: &[Point; 8]| {
             let strains = self.points.strains(&self.corners(node, u));
-            let stored = |p: usize| {
-                std::array::from_fn(|i| strains[p][i] - points[p].plastic_strain[i])
-            };
+            let stored =
+                |p: usize| std::array::from_fn(|i| strains[p][i] - points[p].plastic_strain[i]);
             std::array::from_fn::<Tensor, 8, _>(|p| elastic.stress(&stored(p)))
         };
         let (first, last) = (stress(from, &earlier), stress(u, &y.state.points));
@@ -160,7 +161,9 @@ impl<'a, E: Coarsen, T: Fn(usize) -> Tissue + Sync> PlasticBricks<'a, E, T> {
     }
 
     fn look_at(&self, nodes: Range<usize>, u: &[[f64; 3]]) -> Vec<Yielded> {
-        let first = self.before.partition_point(|s| (s.node as usize) < nodes.start);
+        let first = self
+            .before
+            .partition_point(|s| (s.node as usize) < nodes.start);
         let mut known = self.before[first..].iter().peekable();
         let mut found = Vec::new();
         for segment in self.mesh.segments_in(nodes) {
@@ -177,7 +180,12 @@ impl<'a, E: Coarsen, T: Fn(usize) -> Tissue + Sync> PlasticBricks<'a, E, T> {
     }
 
     /// An element under these strains; None where it has never flowed.
-    fn element(&self, node: usize, strains: &[Tensor; 8], earlier: Option<&State>) -> Option<Yielded> {
+    fn element(
+        &self,
+        node: usize,
+        strains: &[Tensor; 8],
+        earlier: Option<&State>,
+    ) -> Option<Yielded> {
         let Tissue { elastic, law } = (self.tissue)(node);
         if earlier.is_none() && !strains.iter().any(|strain| law.yields(&elastic, strain)) {
             return None;
@@ -211,10 +219,11 @@ impl<'a, E: Coarsen, T: Fn(usize) -> Tissue + Sync> PlasticBricks<'a, E, T> {
             axial.iter().map(|v| v * v).sum::<f64>().sqrt() > radians
         };
         let count = (0..self.mesh.len()).into_par_iter();
-        let count = count.filter(|node| self.mesh.has_element(*node) && turned(*node)).count();
+        let count = count
+            .filter(|node| self.mesh.has_element(*node) && turned(*node))
+            .count();
         count as f64 / self.mesh.elements as f64
     }
-
 }
 
 impl<'a, E: Coarsen, T: Fn(usize) -> Tissue + Sync> Incremental for PlasticBricks<'a, E, T> {
@@ -229,11 +238,16 @@ impl<'a, E: Coarsen, T: Fn(usize) -> Tissue + Sync> Incremental for PlasticBrick
             if this.yielded.is_empty() {
                 return;
             }
-            each_yielded(this.mesh, &this.slots, nodes.clone(), |node, corner, slot, _, _| {
-                let plastic = this.yielded[slot].forces[corner];
-                let f = &mut f[node - nodes.start];
-                (0..3).for_each(|a| f[a] += plastic[a]);
-            });
+            each_yielded(
+                this.mesh,
+                &this.slots,
+                nodes.clone(),
+                |node, corner, slot, _, _| {
+                    let plastic = this.yielded[slot].forces[corner];
+                    let f = &mut f[node - nodes.start];
+                    (0..3).for_each(|a| f[a] += plastic[a]);
+                },
+            );
         });
     }
 

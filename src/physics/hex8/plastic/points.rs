@@ -103,8 +103,9 @@ impl Points {
                 let edges = [[edge(0, 0), edge(0, 1)], [edge(1, 0), edge(1, 1)]];
                 // Along the first axis across, then the second.
                 for i in 0..2 {
-                    let line: [f64; 2] =
-                        std::array::from_fn(|j| near(i, 0) * edges[0][j] + near(i, 1) * edges[1][j]);
+                    let line: [f64; 2] = std::array::from_fn(|j| {
+                        near(i, 0) * edges[0][j] + near(i, 1) * edges[1][j]
+                    });
                     for j in 0..2 {
                         let value = near(j, 0) * line[0] + near(j, 1) * line[1];
                         let point = i << b | j << c;
@@ -119,16 +120,9 @@ impl Points {
 
     /// Strains at the points, engineering shears.
     pub fn strains(&self, u: &Corners) -> [Tensor; 8] {
-        let mut strains = self.displacement_gradients(u).map(|[x, y, z]| {
-            [
-                x[0],
-                y[1],
-                z[2],
-                y[2] + z[1],
-                x[2] + z[0],
-                x[1] + y[0],
-            ]
-        });
+        let mut strains = self
+            .displacement_gradients(u)
+            .map(|[x, y, z]| [x[0], y[1], z[2], y[2] + z[1], x[2] + z[0], x[1] + y[0]]);
         if self.is_mean {
             let volumes = strains.map(|e| e[0] + e[1] + e[2]);
             let mean = 0.125 * volumes.iter().sum::<f64>();

@@ -4,9 +4,9 @@
 use super::points::{Couplings, Points, Scalar, pair};
 use super::{NONE, Yielded, each_yielded};
 use crate::discretisation::voxels::VoxelMesh;
-use crate::operator::Operator;
-use crate::operator::coarsen::{Block, Coarsen, VisitRow};
-use crate::par::CHUNK;
+use crate::operator::coarsen::Coarsen;
+use crate::operator::{MixedPrecision, Operator};
+use crate::par::{CHUNK, each_chunk};
 use rayon::prelude::*;
 use std::ops::{AddAssign, Range, Sub};
 
@@ -34,14 +34,17 @@ impl<'a, E: Coarsen, K: Scalar> Tangent<'a, E, K> {
         Tangent {
             elastic,
             mesh,
-            couplings: flowing.par_iter().map(|y| points.couplings(&y.softening)).collect(),
+            couplings: flowing
+                .par_iter()
+                .map(|y| points.couplings(&y.softening))
+                .collect(),
             slots,
         }
     }
 
-    /// Elements that flow.
-    pub fn flowing(&self) -> usize {
-        self.couplings.len()
+    fn rows(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+        self.elastic.rows_f64(sites.clone(), x, y);
+        self.add_rows(sites, x, y);
     }
 
     /// Adds what flowing elements change to rows of `A x`. Differences from a node's own displacement are gathered: a translation
@@ -53,27 +56,36 @@ impl<'a, E: Coarsen, K: Scalar> Tangent<'a, E, K> {
         if self.couplings.is_empty() {
             return;
         }
-        each_yielded(self.mesh, &self.slots, nodes.clone(), |node, own, slot, rows, i| {
-            let (k, here) = (&self.couplings[slot], x[node]);
-            let mut sum = [0.0; 3];
-            for other in 0..8 {
-                if other == own {
-                    continue;
-                }
-                let there = x[neighbour(rows, i, own, other)];
-                let d: [f64; 3] = std::array::from_fn(|a| (there[a] - here[a]).into());
-                let (low, high) = (own.min(other), own.max(other));
-                let block = &k[9 * pair(low, high)..][..9];
-                for a in 0..3 {
-                    for b in 0..3 {
-                        let entry = if own < other { block[3 * a + b] } else { block[3 * b + a] };
-                        sum[a] += entry.into() * d[b];
+        each_yielded(
+            self.mesh,
+            &self.slots,
+            nodes.clone(),
+            |node, own, slot, rows, i| {
+                let (k, here) = (&self.couplings[slot], x[node]);
+                let mut sum = [0.0; 3];
+                for other in 0..8 {
+                    if other == own {
+                        continue;
+                    }
+                    let there = x[neighbour(rows, i, own, other)];
+                    let d: [f64; 3] = std::array::from_fn(|a| (there[a] - here[a]).into());
+                    let (low, high) = (own.min(other), own.max(other));
+                    let block = &k[9 * pair(low, high)..][..9];
+                    for a in 0..3 {
+                        for b in 0..3 {
+                            let entry = if own < other {
+                                block[3 * a + b]
+                            } else {
+                                block[3 * b + a]
+                            };
+                            sum[a] += entry.into() * d[b];
+                        }
                     }
                 }
-            }
-            let y = &mut y[node - nodes.start];
-            (0..3).for_each(|a| y[a] += S::of(sum[a]));
-        });
+                let y = &mut y[node - nodes.start];
+                (0..3).for_each(|a| y[a] += S::of(sum[a]));
+            },
+        );
     }
 }
 
@@ -90,16 +102,21 @@ impl<E: Coarsen, K: Scalar> Operator<3> for Tangent<'_, E, K> {
 
     fn apply(&self, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
         y.par_chunks_mut(CHUNK).enumerate().for_each(|(c, y)| {
-            self.rows_f64(c * CHUNK..c * CHUNK + y.len(), x, y);
+            self.rows(c * CHUNK..c * CHUNK + y.len(), x, y);
         });
     }
 
     fn diagonal(&self, d: &mut [[f64; 3]]) {
         self.elastic.diagonal(d);
-        each_yielded(self.mesh, &self.slots, 0..d.len(), |node, own, slot, _, _| {
-            let block = own_block(&self.couplings[slot], own);
-            (0..3).for_each(|a| d[node][a] += block[a][a]);
-        });
+        each_yielded(
+            self.mesh,
+            &self.slots,
+            0..d.len(),
+            |node, own, slot, _, _| {
+                let block = own_block(&self.couplings[slot], own);
+                (0..3).for_each(|a| d[node][a] += block[a][a]);
+            },
+        );
     }
 }
 
@@ -110,7 +127,11 @@ fn own_block<K: Scalar>(k: &Couplings<K>, own: usize) -> [[f64; 3]; 3] {
         let block = &k[9 * pair(own.min(other), own.max(other))..][..9];
         for a in 0..3 {
             for b in 0..3 {
-                let entry = if own < other { block[3 * a + b] } else { block[3 * b + a] };
+                let entry = if own < other {
+                    block[3 * a + b]
+                } else {
+                    block[3 * b + a]
+                };
                 sum[a][b] -= entry.into();
             }
         }
@@ -118,62 +139,32 @@ fn own_block<K: Scalar>(k: &Couplings<K>, own: usize) -> [[f64; 3]; 3] {
     sum
 }
 
-impl<E: Coarsen, K: Scalar> Coarsen for Tangent<'_, E, K> {
-    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
-        self.elastic.positions(sites, x);
-    }
-
-    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
-        let mut changed = Vec::with_capacity(27);
-        self.elastic.each_row(sites, &mut |node, columns, blocks| {
-            changed.clear();
-            changed.extend_from_slice(blocks);
-            each_yielded(self.mesh, &self.slots, node..node + 1, |_, own, slot, rows, i| {
-                let k = &self.couplings[slot];
-                for other in 0..8 {
-                    let column = neighbour(rows, i, own, other) as u32;
-                    let Some(at) = columns.iter().position(|c| *c == column) else {
-                        continue;
-                    };
-                    if other == own {
-                        let block = own_block(k, own);
-                        (0..9).for_each(|e| changed[at][e / 3][e % 3] += block[e / 3][e % 3] as f32);
-                        continue;
-                    }
-                    let block = &k[9 * pair(own.min(other), own.max(other))..][..9];
-                    for a in 0..3 {
-                        for b in 0..3 {
-                            let entry = block[if own > other { 3 * b + a } else { 3 * a + b }];
-                            changed[at][a][b] += entry.into() as f32;
-                        }
-                    }
-                }
-            });
-            visit(node, columns, &changed);
+impl<E: Coarsen, K: Scalar> MixedPrecision for Tangent<'_, E, K> {
+    fn apply_single(
+        &self,
+        x: &[[f32; 3]],
+        y: &mut [[f32; 3]],
+        finish: impl Fn(usize, &mut [[f32; 3]]) -> f64 + Sync,
+    ) -> f64 {
+        let [sum] = each_chunk(y, CHUNK, |first, y| {
+            let sites = first..first + y.len();
+            self.elastic.rows_f32(sites.clone(), x, y);
+            self.add_rows(sites, x, y);
+            [finish(first, y)]
         });
+        sum
     }
 
-    fn reach(&self, sites: Range<usize>) -> Range<usize> {
-        self.elastic.reach(sites)
-    }
-
-    fn hinges(&self, sites: Range<usize>, hinges: &mut [bool]) {
-        self.elastic.hinges(sites, hinges);
-    }
-
-    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        self.elastic.rows_f64(sites.clone(), x, y);
-        self.add_rows(sites, x, y);
-    }
-
-    fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
-        self.elastic.rows_f32(sites.clone(), x, y);
-        self.add_rows(sites, x, y);
-    }
-
-    /// No part of a positive matrix of eight blocks has an eigenvalue above eight; the linear elements' own bound is lower, and of
-    /// elements that flow the blocks shrink as the matrix does.
-    fn eigenvalue_bound(&self) -> f64 {
-        if self.couplings.is_empty() { self.elastic.eigenvalue_bound() } else { 8.0 }
+    fn for_each_chunk(
+        &self,
+        x: &[[f64; 3]],
+        out: &mut [[f32; 3]],
+        consume: impl Fn(usize, &[[f64; 3]], &mut [[f32; 3]]) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        each_chunk(out, CHUNK, |first, out| {
+            let mut image = vec![[0.0; 3]; out.len()];
+            self.rows(first..first + out.len(), x, &mut image);
+            consume(first, &image, out)
+        })
     }
 }

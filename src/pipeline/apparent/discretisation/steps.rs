@@ -4,7 +4,7 @@ use crate::operator::SinglePreconditioner;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::physics::hex8::plastic::{Balance, PlasticBricks, State, Tissue};
-use crate::solver::load_step::{Balanced, StepParams, Workspace, balance, work_between};
+use crate::solver::load_step::{Balanced, Bounds, StepParams, Workspace, balance, work_between};
 
 /// Supports and load. The load grows from 0 to 1.
 pub struct Loading<'a> {
@@ -98,7 +98,9 @@ impl History {
                 false => self.u[i][a] + share * (self.u[i][a] - self.before[i][a]),
             },
         };
-        (0..self.u.len()).map(|i| std::array::from_fn(|a| at(i, a))).collect()
+        (0..self.u.len())
+            .map(|i| std::array::from_fn(|a| at(i, a)))
+            .collect()
     }
 }
 
@@ -123,14 +125,17 @@ pub fn load<E: Coarsen, T: Fn(usize) -> Tissue + Sync>(
             load => load,
         };
         let mut u = history.guess(loading, load);
-        let outside: Option<Vec<[f64; 3]>> =
-            loading.external.map(|f| f.iter().map(|f| f.map(|v| load * v)).collect());
+        let outside: Option<Vec<[f64; 3]>> = loading
+            .external
+            .map(|f| f.iter().map(|f| f.map(|v| load * v)).collect());
         let found = balance(
             &mut body,
-            loading.held,
+            &Bounds {
+                held: loading.held,
+                external: outside.as_deref(),
+                from: &history.u,
+            },
             preconditioner,
-            outside.as_deref(),
-            &history.u,
             &mut u,
             &how.params,
             &mut work,
@@ -147,7 +152,13 @@ pub fn load<E: Coarsen, T: Fn(usize) -> Tissue + Sync>(
         let balance = body.accept(&history.u, &u, &work.forces);
         let step = Step {
             yielded_points: yielded_points(body.states()),
-            ..step(history, load, &u, &work.forces, (balance, found, cuts))
+            ..step(
+                (history, loading),
+                load,
+                &u,
+                &work.forces,
+                (balance, found, cuts),
+            )
         };
         history.steps.push(step);
         history.before = std::mem::replace(&mut history.u, u);
@@ -165,7 +176,7 @@ pub fn load<E: Coarsen, T: Fn(usize) -> Tissue + Sync>(
 }
 
 fn step(
-    history: &History,
+    (history, loading): (&History, &Loading),
     load: f64,
     u: &[[f64; 3]],
     forces: &[[f64; 3]],
@@ -174,10 +185,16 @@ fn step(
     let earlier = history.steps.last().copied().unwrap_or_default();
     let length = load - earlier.load;
     let conjugate_nmm = work_between(forces, &history.u, u) / length;
+    // The mean of the forces at both ends of the step; displacements of the supports are in proportion to the load, those that
+    // external forces move are not.
+    let work_nmm = match loading.external {
+        None => 0.5 * (earlier.conjugate_nmm + conjugate_nmm) * length,
+        Some(outside) => 0.5 * (earlier.load + load) * work_between(outside, &history.u, u),
+    };
     Step {
         load,
         conjugate_nmm,
-        work_nmm: earlier.work_nmm + 0.5 * (earlier.conjugate_nmm + conjugate_nmm) * length,
+        work_nmm: earlier.work_nmm + work_nmm,
         dissipated_nmm: earlier.dissipated_nmm + balance.dissipated_nmm,
         elastic_nmm: balance.elastic_nmm,
         newton_iterations: found.newton_iterations,

@@ -21,6 +21,10 @@ const DIFFERING: f64 = 28.0;
 /// Bytes more a node of the five fields that a stiffness tensor keeps.
 const KEPT_FIELDS: f64 = 60.0;
 
+/// Bytes more a node of load steps: eight vectors in double precision, four in single, a number; what elements that flow keep (3.4 kB
+/// each) is not known before.
+const LOAD_STEPS: f64 = 8.0 * 24.0 + 4.0 * 12.0 + 4.0;
+
 /// Edge of multigrid's boxes in nodes.
 const BOX: usize = 5;
 
@@ -83,6 +87,9 @@ fn counted(specimen: &Specimen, params: &SolveParams) -> f64 {
     let mut node = if differing { NODE + DIFFERING } else { NODE };
     if params.load == Load::Stiffness && params.conditions == Conditions::Kinematic {
         node += KEPT_FIELDS;
+    }
+    if params.plasticity.is_some() {
+        node += LOAD_STEPS;
     }
     masks + nodes * node + boxes * NODE_BOX
 }

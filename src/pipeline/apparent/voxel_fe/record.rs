@@ -271,7 +271,7 @@ impl<'a> Recorder<'a> {
             at.map_or(0.0, |at| strains[at].1)
         };
         let values = self.on_voxels(scan, |b| [value(b.element)]);
-        let about = "equivalent plastic strain √(2/3 ε:ε), means of elements".to_owned();
+        let about = "equivalent plastic strain, sqrt(2/3 e:e), means of elements".to_owned();
         one("plastic_strain", values, &[], about)
     }
 

@@ -49,7 +49,10 @@ impl VoxelModel {
         }
         let shares = self.shares(&history.states, &plastic);
         if let Some(all) = shares.first() {
-            said.push(format!("{:.2} % of the bone has yielded", 100.0 * all.yielded_share));
+            said.push(format!(
+                "{:.2} % of the bone has yielded",
+                100.0 * all.yielded_share
+            ));
         }
         Yielded {
             iterations: history.steps.iter().map(|s| s.iterations).sum(),
@@ -113,7 +116,9 @@ impl VoxelModel {
             }
         }
         for state in states {
-            let element = mesh.grid.index(mesh.indices(state.node as usize).map(|v| v as usize));
+            let element = mesh
+                .grid
+                .index(mesh.indices(state.node as usize).map(|v| v as usize));
             let flowed = state.points.iter().filter(|p| p.hardening > 0.0).count();
             let at = plastic.binary_search_by_key(&element, |(e, _)| *e);
             let strain = at.map_or(0.0, |at| f64::from(plastic[at].1));

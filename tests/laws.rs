@@ -22,11 +22,8 @@ use bonepd_ct::physics::hex8::plastic::{PlasticBricks, Tissue};
 use bonepd_ct::physics::lattice::connected::{ConnectedLattice, ConnectedSprings};
 use bonepd_ct::physics::lattice::multigrid::Springs;
 use bonepd_ct::physics::lattice::{Lattice, Moduli};
-<<<<<<< HEAD
-use bonepd_ct::physics::tet10::Tet10;
-=======
 use bonepd_ct::physics::plasticity::{DruckerPrager, Elastic, VonMises, YieldLaw};
->>>>>>> plastic
+use bonepd_ct::physics::tet10::Tet10;
 use bonepd_ct::pipeline::lattice::{
     Boundary, Case, Structure, build_connected, build_of, site_values,
 };
@@ -282,7 +279,6 @@ fn heterogeneous_row(kinds: &'static [(f64, Integration)]) -> Model {
     )
 }
 
-<<<<<<< HEAD
 /// Smooth elements in the irregular specimen; their energy is summed over the points of a Gauss rule from the shape functions.
 fn tet10_row(poisson: f64, mixed: bool) -> Model {
     let bone = irregular_specimen().bone;
@@ -358,7 +354,8 @@ fn gauss_energy(at: [[f64; 3]; 10], u: [[f64; 3]; 10], poisson: f64) -> f64 {
         determinant / 24.0 * (0.5 * lambda * trace * trace + mu * squares)
     };
     (0..4).map(point).sum()
-=======
+}
+
 fn von_mises() -> YieldLaw {
     YieldLaw::VonMises(VonMises {
         yield_mpa: 1.0,
@@ -438,7 +435,6 @@ fn yielding_row(law: YieldLaw) -> Model {
         positions,
         Box::new(energy),
     )
->>>>>>> plastic
 }
 
 fn models() -> Vec<Model> {

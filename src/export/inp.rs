@@ -49,7 +49,12 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
             "use --load uniaxial, confined, or another single load",
         );
     }
-<<<<<<< HEAD
+    if yields(params).is_none() && params.plasticity.is_some() {
+        return wrong(
+            "the file has one von Mises law for all tissue",
+            "use --plasticity von-mises:YIELD[,HARDENING], or leave it out",
+        );
+    }
     // The elements of the solve, where they are of another mask than the scan's.
     let resolved = resolution::resolved(specimen, params)?;
     let own = resolution::one_element_a_voxel(params);
@@ -57,14 +62,6 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
         Some(resolved) => (resolved, &own),
         None => (specimen, params),
     };
-=======
-    if yields(params).is_none() && params.plasticity.is_some() {
-        return wrong(
-            "the file has one von Mises law for all tissue",
-            "use --plasticity von-mises:YIELD[,HARDENING], or leave it out",
-        );
-    }
->>>>>>> plastic
     let tissue = &Tissue::of(specimen, params)?;
     let prepared = Prepared { specimen, tissue };
     let model = Bricks::new(prepared, params, Keep::BetweenGrips)?;

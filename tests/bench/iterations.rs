@@ -7,6 +7,7 @@ use bonepd_ct::discretisation::voxels::Planes;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::operator::held::Constrained;
 use bonepd_ct::pipeline::apparent::discretisation::Prepared;
+use bonepd_ct::pipeline::apparent::motion::EndMotion;
 use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::tissue::Tissue;
 use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
@@ -118,9 +119,9 @@ fn plain(specimen: &Specimen, params: &SolveParams) -> (usize, f64) {
     let model = Bricks::new(prepared, params, Keep::BetweenGrips).expect("bricks");
     let grid = model.mesh().grid;
     let grips = Planes::within(&grid, params.axis, 0.0).expect("room between the ends");
-    let stretch_mm = params.strain * grid.size_mm()[params.axis.index()];
-    let held = supports::held(model.mesh(), grips, params);
-    let mut u = supports::bar(model.mesh(), grips, stretch_mm);
+    let motion = EndMotion::of(specimen, params, grid.size_mm()[params.axis.index()]);
+    let held = supports::held(model.mesh(), grips, &motion, params.load);
+    let mut u = supports::start(model.mesh(), grips, &motion);
     let diagonal = Jacobi::new(&Constrained {
         inner: &model,
         held: &held,

@@ -381,12 +381,8 @@ fn symmetric_shears_make_a_stiffness() {
         &specimen([4, 5, 6], [0.02; 3], |_| true),
         Conditions::Symshear,
     );
-    for i in 3..6 {
-        assert!(
-            (solid[i][i] / (1000.0 / 2.6) - 1.0).abs() < 1e-6,
-            "{}",
-            solid[i][i]
-        );
+    for (i, row) in solid.iter().enumerate().skip(3) {
+        assert!((row[i] / (1000.0 / 2.6) - 1.0).abs() < 1e-6, "{}", row[i]);
     }
     let bone = crate::laws::irregular_specimen();
     let [symshear, mixed, kinematic] = [

@@ -56,7 +56,8 @@ pub struct OpenScan {
 /// A row with its fields, and whether it was kept from an earlier solve.
 struct Made {
     row: Row,
-    details: Details,
+    /// None for a row that was kept: those it had.
+    details: Option<Details>,
     fields: Fields,
     is_kept: bool,
 }
@@ -178,16 +179,14 @@ impl OpenScan {
             mark(&mut row, self.morphometry.as_ref());
             cautions::mark(&mut row, height_mm);
             session.result(format!("{}{}", in_words(&row), said_of_kept(is_kept)));
-            if let Some(line) = sections_in_words(&details) {
+            if let Some(line) = details.as_ref().and_then(sections_in_words) {
                 session.result(line);
             }
             // The row first: fields that cannot be written do not cost it.
-            let details = match is_kept {
-                true => self.results.details(blank, params),
-                false => details,
+            let curve = match &details {
+                None => self.results.details(blank, params).curve,
+                Some(details) => details.curve.clone(),
             };
-            let curve = details.curve.clone();
-            // A row that was kept too: what was measured of the bone may be new.
             self.results.store(blank, params, &row, details)?;
             if !curve.is_empty() {
                 details::write_curve(&self.dir, &curve)?;
@@ -237,7 +236,7 @@ impl OpenScan {
         if let Some(row) = self.results.find(blank, params).filter(|_| kept) {
             return Ok(Some(Made {
                 row,
-                details: Details::default(),
+                details: None,
                 fields: Fields::None,
                 is_kept: true,
             }));
@@ -297,7 +296,7 @@ impl OpenScan {
         };
         Ok(Made {
             row: metered(row, &meter),
-            details,
+            details: Some(details),
             fields,
             is_kept: false,
         })

@@ -159,19 +159,19 @@ impl Results {
         format!("solve {version} {} {}", key(blank, params), self.mask_blake3())
     }
 
-    /// Stores a solved row with its details, in place of an older one of the same settings, and writes all files.
+    /// Stores a row with its details (None: those it had), in place of an older one of the same settings, and writes all files.
     pub fn store(
         &mut self,
         blank: &Row,
         params: &SolveParams,
         row: &Row,
-        details: Details,
+        details: Option<Details>,
     ) -> Result<()> {
         let mut new = KeyedRow {
             row: row.clone(),
             key: Some(key(blank, params)),
             settings: Some(params.clone()),
-            details,
+            details: Details::default(),
         };
         if let Some(KeyedRow { row: old, .. }) = self.record.rows.first() {
             (new.row.marks.group, new.row.marks.subject) =
@@ -179,8 +179,14 @@ impl Results {
         }
         self.record.provenance.date = host::date();
         match self.record.rows.iter_mut().find(|old| old.key == new.key) {
-            Some(old) => *old = new,
-            None => self.record.rows.push(new),
+            Some(old) => {
+                new.details = details.unwrap_or_else(|| std::mem::take(&mut old.details));
+                *old = new;
+            }
+            None => {
+                new.details = details.unwrap_or_default();
+                self.record.rows.push(new);
+            }
         }
         self.write()
     }
@@ -342,20 +348,10 @@ mod tests {
         let params = SolveParams::default();
         let mut results = Results::open(dir.path(), false).unwrap();
         results
-            .store(
-                &blank(FIRM),
-                &params,
-                &solved(FIRM, 1.0 / 3.0),
-                Details::default(),
-            )
+            .store(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0), None)
             .unwrap();
         results
-            .store(
-                &blank(FLOPPY),
-                &params,
-                &solved(FLOPPY, 0.1),
-                Details::default(),
-            )
+            .store(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1), None)
             .unwrap();
 
         let again = Results::open(dir.path(), false).unwrap();
@@ -395,16 +391,11 @@ mod tests {
         let mut stalled = solved(FIRM, 2.0);
         stalled.solved.as_mut().unwrap().converged = Some(false);
         results
-            .store(&blank(FIRM), &params, &stalled, Details::default())
+            .store(&blank(FIRM), &params, &stalled, None)
             .unwrap();
         assert_eq!(results.find(&blank(FIRM), &params), None);
         results
-            .store(
-                &blank(FIRM),
-                &params,
-                &solved(FIRM, 1.0),
-                Details::default(),
-            )
+            .store(&blank(FIRM), &params, &solved(FIRM, 1.0), None)
             .unwrap();
         let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
         assert_eq!(table, [solved(FIRM, 1.0)]);

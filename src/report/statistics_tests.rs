@@ -51,8 +51,8 @@ pub(in super::super) mod cases {
     pub fn with_limit(mut rows: Vec<Row>, method: Method, error: f64) -> Vec<Row> {
         let structure = match method {
             Method::Lattice => CellType::default(),
-            Method::VoxelFe => CellType::Hex8,
             Method::GeometryFe => CellType::Tet10,
+            _ => CellType::Hex8,
         };
         for scan in distinct(rows.iter().map(|row| row.key.scan.clone())) {
             let first = rows

@@ -291,6 +291,26 @@ mod tests {
         assert!(y.iter().flatten().all(|f| *f == 0.0));
     }
 
+    /// To the last bit: what a task has of its neighbours' bricks is what they have.
+    #[test]
+    fn any_range_of_rows_is_that_of_the_whole() {
+        for (seed, percent) in [(0, 20), (1, 45), (3, 70), (5, 100)] {
+            let op = random([19, 7, 6], percent, seed);
+            let n = op.sites();
+            let x: Vec<[f32; 3]> = vector(n).iter().map(|v| v.map(|c| c as f32)).collect();
+            let mut whole = vec![[0.0; 3]; n];
+            op.rows_f32(0..n, &x, &mut whole);
+            for length in [1, 2, 7, 50, n / 3] {
+                let mut parts = vec![[0.0; 3]; n];
+                for (c, part) in parts.chunks_mut(length).enumerate() {
+                    let start = c * length;
+                    op.rows_f32(start..start + part.len(), &x, part);
+                }
+                assert_eq!(parts, whole, "{percent} %, {length} at a time");
+            }
+        }
+    }
+
     #[test]
     fn rows_are_what_the_operator_applies() {
         let op = random([9, 6, 5], 50, 3);

@@ -195,7 +195,10 @@ fn fill(
             let after = law.yield_mpa + law.hardening_mpa;
             writeln!(out, "*PLASTIC\n{}, 0.0\n{after}, 1.0", law.yield_mpa)?;
         }
-        writeln!(out, "*SOLID SECTION, ELSET=BONE{name}, MATERIAL=TISSUE{name}")?;
+        writeln!(
+            out,
+            "*SOLID SECTION, ELSET=BONE{name}, MATERIAL=TISSUE{name}"
+        )?;
     }
     writeln!(out, "*NSET, NSET=HIGH")?;
     for node in nodes().filter(|&n| mesh.indices(n)[axis] as usize >= grips.high) {

@@ -270,15 +270,27 @@ const RESULTS: [Column; 61] = [
     FAILURE_DISPLACEMENT,
     FAILURE_STRAIN,
     SED,
-    column("plasticity", "", "law by which tissue yields, as on the command line; NA where it is elastic"),
-    column("steps", "", "even load steps of plasticity; failed ones are halved"),
+    column(
+        "plasticity",
+        "",
+        "law by which tissue yields, as on the command line; NA where it is elastic",
+    ),
+    column(
+        "steps",
+        "",
+        "even load steps of plasticity; failed ones are halved",
+    ),
     column(
         "yield_stress_mpa",
         "MPa",
         "apparent stress at yield by the 0.2 % offset, a magnitude; NA where the curve ends before",
     ),
     column("yield_strain", "", "nominal strain at yield, a magnitude"),
-    column("max_stress_mpa", "MPa", "largest apparent stress of the curve, a magnitude"),
+    column(
+        "max_stress_mpa",
+        "MPa",
+        "largest apparent stress of the curve, a magnitude",
+    ),
 ];
 
 const FAILED: [Column; 3] = [

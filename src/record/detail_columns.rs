@@ -119,13 +119,21 @@ pub const YIELDED: File = File {
     columns: &with::<19>(&[
         LABEL,
         ELEMENTS,
-        column("yielded_share", "", "share of the volume that has ever flowed, by integration points"),
+        column(
+            "yielded_share",
+            "",
+            "share of the volume that has ever flowed, by integration points",
+        ),
         column(
             "maximum_plastic_strain",
             "",
             "largest equivalent plastic strain √(2/3 ε:ε), means of elements",
         ),
-        column("mean_plastic_strain", "", "the same, mean over all elements"),
+        column(
+            "mean_plastic_strain",
+            "",
+            "the same, mean over all elements",
+        ),
     ]),
 };
 
@@ -134,13 +142,33 @@ pub const CURVE: File = File {
     about: "the stress-strain curve of the last solve with --plasticity, one line a load step; signed as the strain",
     columns: &[
         column("step", "", "number of the load step, from 1"),
-        column("strain", "", "nominal: displacement over the distance of the ends"),
-        column("stress_mpa", "MPa", "force over the whole end area, pores included"),
-        column("force_n", "N", "along the displacement of the ends, from the work of the step"),
-        column("plastic_volume_fraction", "", "share of the bone that has ever flowed"),
+        column(
+            "strain",
+            "",
+            "nominal: displacement over the distance of the ends",
+        ),
+        column(
+            "stress_mpa",
+            "MPa",
+            "force over the whole end area, pores included",
+        ),
+        column(
+            "force_n",
+            "N",
+            "along the displacement of the ends, from the work of the step",
+        ),
+        column(
+            "plastic_volume_fraction",
+            "",
+            "share of the bone that has ever flowed",
+        ),
         column("energy_mj", "mJ", "stored elastically now"),
         column("dissipated_mj", "mJ", "by plastic flow since the start"),
-        column("work_mj", "mJ", "of the ends since the start: mean force of a step times its displacement"),
+        column(
+            "work_mj",
+            "mJ",
+            "of the ends since the start: mean force of a step times its displacement",
+        ),
         column("iterations", "", "of conjugate gradients in this step"),
     ],
 };

@@ -156,7 +156,11 @@ impl Results {
     /// What tells a solve of this mask from every other, in short.
     pub fn fingerprint(&self, blank: &Row, params: &SolveParams) -> String {
         let version = &self.record.provenance.version;
-        format!("solve {version} {} {}", key(blank, params), self.mask_blake3())
+        format!(
+            "solve {version} {} {}",
+            key(blank, params),
+            self.mask_blake3()
+        )
     }
 
     /// Stores a row with its details (None: those it had), in place of an older one of the same settings, and writes all files.

@@ -18,9 +18,9 @@ pub mod table;
 
 use crate::result::cautions::WARNING;
 use crate::result::notes::{Alike, Alikes, parts};
-use crate::result::strength::CurvePoint;
 use crate::result::row::Row;
 use crate::result::settings::{BoundaryRule, Elements, Method};
+use crate::result::strength::CurvePoint;
 use answers::Answers;
 use figure::Figure;
 use groups::Groups;
@@ -71,7 +71,8 @@ pub fn report(
 ) -> Report {
     let mut figures = answer_figures::figures(&answers);
     let strength = strength.iter();
-    figures.extend(strength.filter_map(|(scan, curve)| curves::strength::stress_strain(scan, curve)));
+    figures
+        .extend(strength.filter_map(|(scan, curve)| curves::strength::stress_strain(scan, curve)));
     figures.extend(curves::convergence(rows));
     figures.extend(curves::wall_time(rows));
     figures.extend(curves::speed_error(rows));

@@ -151,7 +151,10 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         stiffness_n_per_mm: forces.map(|[_, k]| k),
         force_n: forces.map(|[f, _]| f),
         failure_load_n: row.failure().and_then(|f| f.load_n),
-        yield_stress_mpa: row.solved.as_ref().and_then(|s| s.strength.yield_stress_mpa),
+        yield_stress_mpa: row
+            .solved
+            .as_ref()
+            .and_then(|s| s.strength.yield_stress_mpa),
         threshold_sensitivity: row.solved.as_ref().and_then(|s| s.threshold_sensitivity),
         note,
         angle_deg: key.angle_deg,

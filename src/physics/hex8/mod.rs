@@ -6,9 +6,9 @@
 pub mod element;
 pub mod fields;
 pub mod heterogeneous;
-pub mod plastic;
 mod kernel;
 mod modes;
+pub mod plastic;
 mod stencils;
 
 use crate::discretisation::voxels::VoxelMesh;

@@ -1,8 +1,8 @@
 //! Owns which settings of a solve are refused, and in which words.
 
 use crate::error::{Error, Result};
-use crate::pipeline::apparent::fields::Field;
 use crate::physics::plasticity::Plasticity;
+use crate::pipeline::apparent::fields::Field;
 use crate::pipeline::apparent::params::{CoarsenBy, Load, Method, SolveParams};
 use crate::result::settings::Motion;
 
@@ -152,7 +152,11 @@ fn check_plasticity(params: &SolveParams) -> Result<()> {
     };
     plasticity.check()?;
     if params.steps == 0 {
-        return wrong("solve.steps", "0 load steps load nothing", "give 1 or more (usual: 10)");
+        return wrong(
+            "solve.steps",
+            "0 load steps load nothing",
+            "give 1 or more (usual: 10)",
+        );
     }
     if params.method == Method::Lattice {
         return wrong(
@@ -189,7 +193,11 @@ fn check_plasticity(params: &SolveParams) -> Result<()> {
             "leave --failure and --statistics out: the curve has the strength itself",
         );
     }
-    if params.fields.iter().any(|field| !Field::OF_YIELDED.contains(field)) {
+    if params
+        .fields
+        .iter()
+        .any(|field| !Field::OF_YIELDED.contains(field))
+    {
         return wrong(
             "solve.fields",
             "stresses and energy densities are written of elastic tissue only",

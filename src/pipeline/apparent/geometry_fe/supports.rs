@@ -60,11 +60,7 @@ pub fn start(mesh: &TetMesh, grips: &Grips, motion: &EndMotion) -> Displacements
 }
 
 /// Calls `visit` with every gripped node, which end it is of, and its place in mm.
-pub fn each_end_node(
-    mesh: &TetMesh,
-    grips: &Grips,
-    visit: &mut dyn FnMut(usize, End, [f64; 3]),
-) {
+pub fn each_end_node(mesh: &TetMesh, grips: &Grips, visit: &mut dyn FnMut(usize, End, [f64; 3])) {
     for (node, at) in mesh.nodes_mm.iter().enumerate() {
         if grips.is_gripped(*at) {
             let end = match grips.is_upper(*at) {

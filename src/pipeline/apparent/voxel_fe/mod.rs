@@ -19,11 +19,11 @@ use crate::measure::apparent::EndWork;
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
 use crate::par::sum_chunks;
+use crate::pipeline::apparent::discretisation::Displacements;
+use crate::pipeline::apparent::discretisation::yielded::{Kept, Yielded};
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, Places, Prepared, System,
 };
-use crate::pipeline::apparent::discretisation::Displacements;
-use crate::pipeline::apparent::discretisation::yielded::{Kept, Yielded};
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;

@@ -41,8 +41,8 @@ pub fn held(mesh: &TetMesh, grips: &Grips, params: &SolveParams) -> Held {
     let mut held = Held::none(mesh.nodes_mm.len());
     for (node, at) in mesh.nodes_mm.iter().enumerate() {
         let (on, gripped) = (mesh.faces_at(*at), grips.is_gripped(*at));
-        for c in 0..3 {
-            let confined = params.load == Load::Confined && c != grips.axis && on[c] != 0;
+        for (c, on) in on.into_iter().enumerate() {
+            let confined = params.load == Load::Confined && c != grips.axis && on != 0;
             if confined || gripped && (c == grips.axis || params.ends == Ends::Bonded) {
                 held.hold(node, c);
             }

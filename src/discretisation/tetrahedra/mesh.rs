@@ -60,11 +60,8 @@ impl Mesh {
             .iter()
             .flatten()
             .for_each(|v| name[*v as usize] = 0);
-        let mut next = 0;
-        for v in name.iter_mut().filter(|v| **v == 0) {
-            *v = next;
-            next += 1;
-        }
+        let used = name.iter_mut().filter(|v| **v == 0);
+        used.enumerate().for_each(|(i, v)| *v = i as u32);
         let used = |v: usize| name[v] != u32::MAX;
         let mut v = 0;
         self.vertices_mm.retain(|_| {

@@ -15,7 +15,7 @@ pub struct Quality {
     pub largest_degrees: f64,
     /// Elements with an angle outside [`BOUNDS_DEGREES`].
     pub outside: usize,
-    /// Of them, those that do not touch a face of the box.
+    /// Of them, those away from the faces of the box.
     pub outside_inside_box: usize,
 }
 
@@ -43,6 +43,15 @@ pub fn angles(corners: [[f64; 3]; 4]) -> [f64; 2] {
     range
 }
 
+/// Part of a cell's edge around the faces of the box in which angles have no bounds: a vertex on a face cannot always move onto
+/// the surface, which then crosses its short edges nearer than elsewhere, up to 0.36 of their 0.87 cells away.
+const NEAR_FACE: f64 = 0.32;
+
+fn is_near_face(mesh: &Mesh, at: &[f64; 3]) -> bool {
+    let near = NEAR_FACE * mesh.cell_mm;
+    (0..3).any(|a| at[a] < near || at[a] > mesh.size_mm[a] - near)
+}
+
 /// Whether an angle is outside [`BOUNDS_DEGREES`].
 pub fn beyond([least, largest]: [f64; 2]) -> bool {
     least < BOUNDS_DEGREES[0] || largest > BOUNDS_DEGREES[1]
@@ -53,7 +62,7 @@ pub fn quality(mesh: &Mesh) -> Quality {
         let corners = mesh.corners(e);
         let [least, largest] = angles(corners);
         let outside = beyond([least, largest]);
-        let at_face = corners.iter().any(|p| mesh.faces_at(*p) != [0; 3]);
+        let at_face = corners.iter().any(|p| is_near_face(mesh, p));
         Quality {
             least_degrees: least,
             largest_degrees: largest,

@@ -18,13 +18,11 @@ pub struct Corners {
 
 impl Corners {
     pub fn of(mesh: &TetMesh) -> Corners {
-        let mut number = 0;
         let mut name = vec![u32::MAX; mesh.nodes_mm.len()];
         let mut nodes = Vec::new();
         for (node, _) in mesh.is_corner.iter().enumerate().filter(|n| *n.1) {
-            name[node] = number;
+            name[node] = nodes.len() as u32;
             nodes.push(node as u32);
-            number += 1;
         }
         let mut of_node: Vec<[u32; 2]> = name.iter().map(|n| [*n; 2]).collect();
         for ten in &mesh.elements {

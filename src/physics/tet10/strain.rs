@@ -14,7 +14,7 @@ impl Tet10 {
         let u = |local: usize| u[ten[local] as usize];
         std::array::from_fn(|k| {
             let mut g = [[0.0; 3]; 3];
-            for j in 0..4 {
+            for (j, slope) in slopes.iter().enumerate() {
                 let edge = EDGES.iter().position(|p| *p == [k, j] || *p == [j, k]);
                 let by = match edge {
                     None => u(k).map(|v| 3.0 * v),
@@ -24,7 +24,7 @@ impl Tet10 {
                     }
                 };
                 for c in 0..3 {
-                    (0..3).for_each(|d| g[c][d] += by[c] * slopes[j][d]);
+                    (0..3).for_each(|d| g[c][d] += by[c] * slope[d]);
                 }
             }
             g

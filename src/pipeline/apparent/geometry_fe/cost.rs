@@ -10,10 +10,12 @@ const PER_CELL: f64 = 12.0;
 /// Elements more that the surface takes, per cell's edge over the thickness `2 BV / BS`.
 const AT_SURFACE: f64 = 0.6;
 
-/// Bytes per element at the highest and per vertex of the lattice, seconds per element on two cores.
-const BYTES: f64 = 620.0;
+/// Bytes per element at the highest (717 to 744 measured on 0.5 and 1 million), per vertex of the lattice, and per voxel of the
+/// values that the surface keeps; seconds per element on two cores, half of the 25 µs of one.
+const BYTES: f64 = 730.0;
 const BYTES_PER_VERTEX: f64 = 9.0;
-const S_PER_ELEMENT: f64 = 1.0e-5;
+const BYTES_PER_VOXEL: f64 = 4.0;
+const S_PER_ELEMENT: f64 = 1.25e-5;
 
 /// Edge of a cell in voxels where nothing but the header is known.
 const ASSUMED_VOXELS: f64 = 2.0;
@@ -27,11 +29,8 @@ pub fn of(params: &SolveParams, known: Known) -> Cost {
                 _ => ASSUMED_VOXELS.powi(3),
             };
             let elements = PER_CELL * 1.5 * ASSUMED_BONE * voxels / cell;
-            cost(
-                elements,
-                2.0 * voxels / cell,
-                params.element_mm.unwrap_or(0.0),
-            )
+            let vertices = 2.0 * voxels / cell;
+            cost(elements, vertices, voxels, params.element_mm.unwrap_or(0.0))
         }
         Known::Volume(prepared) | Known::Bone(prepared) => of_bone(params, prepared),
     }
@@ -44,12 +43,18 @@ fn of_bone(params: &SolveParams, Prepared { specimen, .. }: Prepared) -> Cost {
     let at_surface = thickness.map_or(0.0, |t| AT_SURFACE * size_mm / t);
     let volume = specimen.bone.grid.size_mm().iter().product::<f64>();
     let vertices = 2.0 * volume / size_mm.powi(3);
-    cost(PER_CELL * cells * (1.0 + at_surface), vertices, size_mm)
+    let voxels = specimen.bone.grid.len() as f64;
+    cost(
+        PER_CELL * cells * (1.0 + at_surface),
+        vertices,
+        voxels,
+        size_mm,
+    )
 }
 
-fn cost(elements: f64, vertices: f64, size_mm: f64) -> Cost {
+fn cost(elements: f64, vertices: f64, voxels: f64, size_mm: f64) -> Cost {
     Cost {
-        bytes: [elements * BYTES + vertices * BYTES_PER_VERTEX; 2],
+        bytes: [elements * BYTES + vertices * BYTES_PER_VERTEX + voxels * BYTES_PER_VOXEL; 2],
         time_s: Some(elements * S_PER_ELEMENT),
         resolution: Resolution::Element(size_mm),
     }

@@ -43,8 +43,8 @@ pub fn held(mesh: &TetMesh, grips: &Grips, motion: &EndMotion, load: Load) -> He
     let mut held = Held::none(mesh.nodes_mm.len());
     for (node, at) in mesh.nodes_mm.iter().enumerate() {
         let (on, gripped) = (mesh.faces_at(*at), grips.is_gripped(*at));
-        for c in 0..3 {
-            let confined = load == Load::Confined && c != grips.axis && on[c] != 0;
+        for (c, on) in on.into_iter().enumerate() {
+            let confined = load == Load::Confined && c != grips.axis && on != 0;
             if confined || gripped && (c == grips.axis || motion.held_sideways) {
                 held.hold(node, c);
             }

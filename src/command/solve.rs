@@ -29,7 +29,7 @@ use crate::result::details::Details;
 use crate::result::extrapolate::is_extrapolated;
 use crate::result::notes;
 use crate::result::row::{FailureLoad, Marks, Row};
-use crate::result::settings::{BoundaryRule, Settings};
+use crate::result::settings::{BoundaryRule, Elements, Settings};
 use crate::result::shape;
 use crate::result::shape::Image;
 use crate::result::voxel_check;
@@ -314,6 +314,9 @@ impl OpenScan {
             let surface = self.surface(sensitivity);
             let stated = shape::of_one_solve(self.image, elements, size, surface);
             shape::state(row, stated);
+            if matches!(elements, Elements::SmoothGrey | Elements::SmoothMask) {
+                notes::add(&mut row.marks.note, shape::SMOOTH);
+            }
         }
     }
 

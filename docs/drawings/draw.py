@@ -333,7 +333,7 @@ def conditions():
         d.line(x + 0.65, 3.6, x + 0.65, 3.2, STRONG, 3)
         d.polygon([(x + 0.55, 3.24), (x + 0.75, 3.24), (x + 0.65, 3.06)], STRONG, "none")
         label(d, x + 0.65, 0.12, name)
-    d.caption(["Free: the ends slide sideways. Bonded: they do not. Grips: the outer T mm at each end is rigid.",
+    d.caption(["Free: the ends slide sideways. Bonded: they do not. Grips: the outer T mm at each end moves as one.",
                "Confined: the sides do not move outward."])
     d.save()
 

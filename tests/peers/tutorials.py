@@ -5,13 +5,14 @@
     python3 tests/peers/tutorials.py target/release/bonepd-ct --core FOLDER --tibia FOLDER
 
 Of a page, every `sh` block is run, in the order of the page and in one new folder, except those under `<!-- not run -->`. Then each
-table under `<!-- check FILE KEYS -->` is compared with that CSV file: its header names columns, the columns KEYS choose the row (the
+table under `<!-- check FILE KEYS -->` is compared with that CSV file (or the one row of a JSON file): its header names columns, the columns KEYS choose the row (the
 last one that matches), the others are numbers or words. Tutorials 2 and 3 need public data, in folders that the user names: `$CORE` and `$TIBIA` in
 their commands. `--print` shows what was found.
 """
 
 import argparse
 import csv
+import json
 import os
 import pathlib
 import re
@@ -63,8 +64,9 @@ def check(folder, page, show):
             print(f"FAILED   {file} was not written")
             wrong += 1
             continue
-        with open(folder / file) as handle:
-            lines = list(csv.DictReader(handle))
+        with open(folder / file, encoding="utf-8") as handle:
+            lines = [json.load(handle)] if file.endswith(".json") else list(csv.DictReader(handle))
+        lines = [{key: str(value) for key, value in line.items()} for line in lines]
         for row in rows:
             printed = dict(zip(header, row))
             matching = [line for line in lines if all(same(line[k], printed[k], 1e-6) for k in keys)]

@@ -1,4 +1,4 @@
-"""The commands of the manual run as printed and give the numbers that the manual prints.
+"""The commands of the manual run as printed and give the numbers that the manual prints; its links lead somewhere, its options exist.
 
     cargo build --release
     python3 tests/peers/tutorials.py target/release/bonepd-ct
@@ -105,6 +105,49 @@ def run(name, program, environment, show):
     return wrong
 
 
+def pages():
+    """All pages of the manual, with the folder that their links start from."""
+    return [ROOT / "README.md", ROOT / "pipelines/README.md", *sorted(DOCS.rglob("*.md")), *sorted((ROOT / "reports").glob("*.md"))]
+
+
+def links():
+    """Relative links that lead nowhere."""
+    wrong = 0
+    for page in pages():
+        text = page.read_text(encoding="utf-8")
+        for target in re.findall(r"\]\(([^)\s]+)\)", text):
+            if re.match(r"[a-z]+:", target):
+                continue
+            file, _, anchor = target.partition("#")
+            found = (page.parent / file).resolve() if file else page
+            if not found.exists():
+                print(f"FAILED   {page.relative_to(ROOT)}: {target} leads nowhere")
+                wrong += 1
+            elif anchor:
+                heads = re.findall(r"^#+ (.*)", found.read_text(encoding="utf-8"), re.M)
+                if anchor not in [re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads]:
+                    print(f"FAILED   {page.relative_to(ROOT)}: {target} has no such heading")
+                    wrong += 1
+    print(f"{'FAILED' if wrong else 'ok':8} links: {wrong} lead nowhere")
+    return wrong
+
+
+def flags(program):
+    """Options in the commands of all pages that the program does not have."""
+    known, wrong = {}, 0
+    for page in pages():
+        text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+        for verb, rest in re.findall(r"bonepd-ct (\w+)([^\n`#|]*)", "\n".join(re.findall(r"^```sh\n(.*?)^```", text, re.S | re.M))):
+            if verb not in known:
+                known[verb] = subprocess.run([program, verb, "--help"], capture_output=True, text=True).stdout
+            for flag in re.findall(r"(?<!\S)--[a-z-]+", rest):
+                if not re.search(re.escape(flag) + r"(?![\w-])", known[verb]):
+                    print(f"FAILED   {page.relative_to(ROOT)}: `bonepd-ct {verb}` has no {flag}")
+                    wrong += 1
+    print(f"{'FAILED' if wrong else 'ok':8} options: {wrong} that the program does not have")
+    return wrong
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program", type=pathlib.Path)
@@ -113,14 +156,14 @@ def main():
     parser.add_argument("--print", action="store_true", dest="show")
     parser.add_argument("--only", help="one page, as tutorials/1-sample-data.md")
     args = parser.parse_args()
-    pages = [
+    tutorials = [
         ("tutorials/1-sample-data.md", {}, None),
         ("conditions.md", {}, None),
         ("tutorials/2-core.md", {"CORE": args.core}, "--core FOLDER: the slices named in the page"),
         ("tutorials/3-tibia.md", {"TIBIA": args.tibia}, "--tibia FOLDER: the files named in the page"),
     ]
-    wrong = 0
-    for name, environment, missing in pages:
+    wrong = 0 if args.only else links() + flags(args.program.resolve())
+    for name, environment, missing in tutorials:
         if args.only and name != args.only:
             continue
         if any(value is None for value in environment.values()):

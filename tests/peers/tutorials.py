@@ -159,6 +159,7 @@ def main():
     tutorials = [
         ("tutorials/1-sample-data.md", {}, None),
         ("conditions.md", {}, None),
+        ("models.md", {}, None),
         ("tutorials/2-core.md", {"CORE": args.core}, "--core FOLDER: the slices named in the page"),
         ("tutorials/3-tibia.md", {"TIBIA": args.tibia}, "--tibia FOLDER: the files named in the page"),
     ]

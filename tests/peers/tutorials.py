@@ -148,6 +148,24 @@ def flags(program):
     return wrong
 
 
+def keys(program):
+    """Keys of the methods paragraph that no result file or recipe has."""
+    text = (DOCS / "methods-paragraph.md").read_text(encoding="utf-8")
+    columns = subprocess.run([program, "columns"], capture_output=True, text=True).stdout
+    recipe = subprocess.run([program, "recipe", "paper"], capture_output=True, text=True).stdout
+    # Not columns: of the program, of groups.csv (`scans`, `n`), the recipe's `error`, and a sentence of answer.json.
+    others = {"version", "n_scans", "n_subjects", "error_target", "conditions"}
+    wrong = [
+        key
+        for key in sorted(set(re.findall(r"\{(\w+)\}", text)) - others - {"key"})
+        if not re.search(rf"^  {key} ", columns, re.M) and not re.search(rf"\b{key} =", recipe)
+    ]
+    for key in wrong:
+        print(f"FAILED   methods-paragraph.md: nothing is called {key}")
+    print(f"{'FAILED' if wrong else 'ok':8} keys of the methods paragraph: {len(wrong)} do not exist")
+    return len(wrong)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program", type=pathlib.Path)
@@ -163,7 +181,7 @@ def main():
         ("tutorials/2-core.md", {"CORE": args.core}, "--core FOLDER: the slices named in the page"),
         ("tutorials/3-tibia.md", {"TIBIA": args.tibia}, "--tibia FOLDER: the files named in the page"),
     ]
-    wrong = 0 if args.only else links() + flags(args.program.resolve())
+    wrong = 0 if args.only else links() + flags(args.program.resolve()) + keys(args.program.resolve())
     for name, environment, missing in tutorials:
         if args.only and name != args.only:
             continue

@@ -49,7 +49,13 @@ def number(word):
         return None
 
 
+def key_is(found, printed):
+    a, b = number(found), number(printed)
+    return found == printed if a is None or b is None else abs(a - b) <= 1e-6 * abs(b)
+
+
 def same(found, printed, tolerance):
+    """Equal within the tolerance and half of the last digit that is printed."""
     a, b = number(found), number(printed)
     if a is None or b is None:
         return found == printed
@@ -69,7 +75,7 @@ def check(folder, page, show):
         lines = [{key: str(value) for key, value in line.items()} for line in lines]
         for row in rows:
             printed = dict(zip(header, row))
-            matching = [line for line in lines if all(same(line[k], printed[k], 1e-6) for k in keys)]
+            matching = [line for line in lines if all(key_is(line[k], printed[k]) for k in keys)]
             if not matching:
                 print(f"FAILED   {file}: no row {[printed[k] for k in keys]}")
                 wrong += 1

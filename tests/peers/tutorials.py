@@ -22,7 +22,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-# Solves of the manual are known to 0.1 % (recipe `quick`: 1 %, the rows under `<!-- check … 1% -->`), by another processor's
+# Solves of the manual are known to 0.1 % (where a page says `<!-- check … 1% -->`, to that: recipe `quick`), by another processor's
 # rounding perhaps to the other side.
 TOLERANCE = 0.002
 

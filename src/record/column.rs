@@ -67,7 +67,7 @@ pub(super) const AXIS: Column = column(
 pub(super) const GRIP: Column = column(
     "grip_mm",
     "mm",
-    "thickness that moves as a rigid plate at each end; 0: end planes only",
+    "thickness that is held at each end, along the axis (bonded ends: in all directions); 0: end planes only",
 );
 pub(super) const GROUP: Column = column("group", "", "from the manifest");
 pub(super) const SUBJECT: Column = column("subject", "", "from the manifest: who the scan is of");

@@ -41,7 +41,7 @@ fn grips(row: &Row, height_mm: f64) -> Option<String> {
     let share = 2.0 * grip_mm / height_mm;
     (share > MOST_GRIPPED).then(|| {
         format!(
-            "grips of {grip_mm} mm hold {:.0} % of the height of {:.2} mm as rigid plates: E_app is that of the part between them and can be several times that of the specimen between its end planes (--grip-mm 0)",
+            "grips of {grip_mm} mm hold {:.0} % of the height of {:.2} mm (free ends slide sideways in them, bonded ends do not): E_app is that of the part between them and can be several times that of the specimen between its end planes (--grip-mm 0)",
             100.0 * share,
             height_mm
         )

@@ -130,7 +130,10 @@ fn a_thick_sphere_under_pressure_flows_as_the_closed_form_says() {
     let mut body = Body::new(mesh([n; 3], 1.0, inside), |at, axis| at[axis] == 0);
     let pressure = 2.0 * flow * ((c / a as f64).ln() + (1.0 - (c / b as f64).powi(3)) / 3.0);
     body.forces = Some(inner_pressure(&body.mesh, pressure, |p| radius(p) <= a));
-    let (outcome, history) = body.load(von_mises(flow, 0.0), &Body::stepping(6));
+    let mut how = Body::stepping(6);
+    // Under forces the balance of the energies is off by the root of this.
+    how.params.tolerance = 1e-13;
+    let (outcome, history) = body.load(von_mises(flow, 0.0), &how);
     assert_eq!(outcome, Outcome::Done);
     // Beyond the front: at the outer surface this is the closed form above.
     let nu = body.poisson;

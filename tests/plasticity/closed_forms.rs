@@ -3,7 +3,7 @@
 use super::bodies::{Body, Field, assert_balanced, asymmetric, mesh, von_mises};
 use bonepd_ct::discretisation::voxels::VoxelMesh;
 use bonepd_ct::physics::plasticity::Elastic;
-use bonepd_ct::pipeline::apparent::discretisation::steps::{History, Outcome, Stepping};
+use bonepd_ct::pipeline::apparent::discretisation::steps::{History, Outcome};
 
 #[test]
 fn a_bar_flows_at_its_yield_stress() {
@@ -52,7 +52,7 @@ fn a_hardening_bar_has_the_slope_of_its_tissue() {
 }
 
 /// The cantilever of Faim's manual: 100 × 0.5 × 10 mm, perfect at 120 MPa, F_y = 10 N.
-fn cantilever(force_n: f64, how: &Stepping) -> (Outcome, History, Body) {
+fn cantilever(force_n: f64) -> (Outcome, History, Body) {
     let n = [200, 1, 20];
     let mut body = Body::new(mesh(n, 0.5, |_| true), |at, c| {
         at[0] == 0 && (c != 1 || at[2] == 0 && at[1] == 0)
@@ -67,7 +67,7 @@ fn cantilever(force_n: f64, how: &Stepping) -> (Outcome, History, Body) {
         }
     }
     body.forces = Some(forces);
-    let (outcome, history) = body.load(von_mises(120.0, 0.0), how);
+    let (outcome, history) = body.load(von_mises(120.0, 0.0), &Body::stepping(14));
     (outcome, history, body)
 }
 
@@ -81,7 +81,7 @@ fn tip_mm(body: &Body, history: &History) -> f64 {
 #[test]
 fn a_cantilever_bends_as_beam_theory_says() {
     for (force_n, theory, faim) in [(10.0, 0.4, 0.4020), (14.0, 0.6188, 0.6149)] {
-        let (outcome, history, body) = cantilever(force_n, &Body::stepping(14));
+        let (outcome, history, body) = cantilever(force_n);
         assert_eq!(outcome, Outcome::Done, "{force_n} N");
         let tip = tip_mm(&body, &history);
         println!("{force_n} N: tip {tip} mm");
@@ -91,28 +91,16 @@ fn a_cantilever_bends_as_beam_theory_says() {
     }
 }
 
-/// 15 N is the collapse load `σ_y b h² / (4 L)` of beam theory: there the tip moves without bound. Here the clamp also holds the root's
-/// height, which makes its surroundings stronger, so the hinge forms some millimetres from it and the arm is shorter: at 15 N the tip is where
-/// Faim has it, between the 14 N value and 0.889 mm, and no equilibrium is found a few percent above.
+/// 15 N is the collapse load `σ_y b h² / (4 L)` of beam theory: there the tip moves without bound, by 0.889 mm as the hinge forms. Here the
+/// clamp also holds the root's height, which makes its surroundings stronger: the hinge forms some millimetres from it, the arm is shorter, and
+/// 15 N are borne with a tip between the 14 N value and that; Faim has 0.756 mm.
 #[test]
-fn a_cantilever_collapses_just_above_its_collapse_load() {
-    let (outcome, history, body) = cantilever(15.0, &Body::stepping(14));
+fn a_cantilever_still_bears_the_collapse_load_of_beam_theory() {
+    let (outcome, history, body) = cantilever(15.0);
     assert_eq!(outcome, Outcome::Done);
     let tip = tip_mm(&body, &history);
     println!("15 N: tip {tip} mm");
     assert!((0.7..0.889).contains(&tip), "{tip}");
-    // Few tries: what fails beyond the collapse fails in any number of them.
-    let mut few = Body::stepping(18);
-    few.halvings = 1;
-    (few.params.max_iterations, few.params.max_cg_iterations) = (12, 400);
-    let (outcome, history, body) = cantilever(18.0, &few);
-    let reached = 18.0 * history.steps.last().unwrap().load;
-    println!(
-        "18 N: {outcome:?} at {reached} N, tip {} mm",
-        tip_mm(&body, &history)
-    );
-    assert_eq!(outcome, Outcome::Stopped);
-    assert!((15.0..16.5).contains(&reached), "{reached}");
 }
 
 /// A thick sphere of perfect tissue under inner pressure (Hill 1950, ch. V): with the plastic front at `c` the pressure is

@@ -89,10 +89,6 @@ impl Elastic {
         }
     }
 
-    pub fn young_mpa(&self) -> f64 {
-        9.0 * self.bulk_mpa * self.shear_mpa / (3.0 * self.bulk_mpa + self.shear_mpa)
-    }
-
     /// Stress of an elastic strain.
     pub fn stress(&self, strain: &Tensor) -> Tensor {
         let volume = strain[0] + strain[1] + strain[2];
@@ -132,14 +128,6 @@ impl YieldLaw {
         match self {
             YieldLaw::VonMises(law) => law.wrong(),
             YieldLaw::Asymmetric(law) => law.wrong(),
-        }
-    }
-
-    /// Yield stresses in tension and compression, MPa, before any flow.
-    pub fn yield_mpa(&self) -> [f64; 2] {
-        match self {
-            YieldLaw::VonMises(law) => [law.yield_mpa; 2],
-            YieldLaw::Asymmetric(law) => [law.tension_mpa, law.compression_mpa],
         }
     }
 

@@ -237,7 +237,11 @@ mod tests {
         for (from, to, expected) in [
             (",0.0,", ",thick,", "lp_mm"),
             ("lattice", "plates", "plates"),
-            (",sc,", ",hcp,", "one of sc, bcc, fcc, hex8, found `hcp`"),
+            (
+                ",sc,",
+                ",hcp,",
+                "one of sc, bcc, fcc, hex8, tet10, found `hcp`",
+            ),
             (",sc,NA,", ",sc,ffg,", "ffb, extrapolated, found `ffg`"),
             (
                 ",free,",

@@ -9,7 +9,7 @@ use bonepd_ct::grid::Axis;
 use bonepd_ct::operator::sparse::Sparse;
 use bonepd_ct::physics::hex8::element::Integration;
 use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
-use bonepd_ct::pipeline::apparent::motion::EndMotion;
+use bonepd_ct::pipeline::apparent::ends::motion::EndMotion;
 use bonepd_ct::pipeline::apparent::solve_lattice;
 use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::solved::Solved;

@@ -9,7 +9,7 @@ use crate::measure::apparent::Loaded;
 use crate::operator::held::Held;
 use crate::physics::plasticity::{Plasticity, VonMises, YieldLaw};
 use crate::pipeline::apparent::discretisation::Prepared;
-use crate::pipeline::apparent::motion::EndMotion;
+use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};

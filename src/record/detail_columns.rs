@@ -116,7 +116,7 @@ pub const SECTIONS: File = File {
 pub const YIELDED: File = File {
     name: "yielded.csv",
     about: "what has flowed of each tissue at the end of the load, where --plasticity is given",
-    columns: &with::<19>(&[
+    columns: &with::<20>(&[
         LABEL,
         ELEMENTS,
         column(

@@ -7,7 +7,7 @@ use bonepd_ct::discretisation::voxels::Planes;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::operator::held::Constrained;
 use bonepd_ct::pipeline::apparent::discretisation::Prepared;
-use bonepd_ct::pipeline::apparent::motion::EndMotion;
+use bonepd_ct::pipeline::apparent::ends::motion::EndMotion;
 use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::tissue::Tissue;
 use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};

@@ -6,7 +6,7 @@ use bonepd_ct::operator::probe::{Probed, probe};
 use bonepd_ct::par::dot;
 use bonepd_ct::pipeline::apparent::SolveParams;
 use bonepd_ct::pipeline::apparent::discretisation::Prepared;
-use bonepd_ct::pipeline::apparent::motion::EndMotion;
+use bonepd_ct::pipeline::apparent::ends::motion::EndMotion;
 use bonepd_ct::pipeline::apparent::tissue::Tissue;
 use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use bonepd_ct::pipeline::apparent::voxel_fe::supports;

@@ -67,7 +67,10 @@ fn cantilever(force_n: f64) -> (Outcome, History, Body) {
         }
     }
     body.forces = Some(forces);
-    let (outcome, history) = body.load(von_mises(120.0, 0.0), &Body::stepping(14));
+    let mut how = Body::stepping(14);
+    // Under forces the balance of the energies is off by the root of this.
+    how.params.tolerance = 1e-13;
+    let (outcome, history) = body.load(von_mises(120.0, 0.0), &how);
     (outcome, history, body)
 }
 

@@ -1,5 +1,6 @@
 //! Owns the seam: what a solve needs of a three-dimensional discretisation of a specimen.
 
+pub mod precondition;
 pub mod steps;
 pub mod yielded;
 
@@ -7,12 +8,12 @@ use crate::error::Result;
 use crate::measure::apparent::EndWork;
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
+use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::yielded::{Kept, Yielded};
+use crate::pipeline::apparent::ends::motion::EndMotion;
+use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
-use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
-use crate::pipeline::apparent::precondition::Precondition;
-use crate::pipeline::apparent::reactions::End;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::result::settings::Settings;

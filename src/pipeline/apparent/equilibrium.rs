@@ -1,9 +1,9 @@
 //! Owns equilibrium: the one way in which every system of equations is solved.
 
 use crate::operator::{Functional, MixedPrecision};
+use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::{Displacements, System};
 use crate::pipeline::apparent::params::{Conditions, Load, SolveParams};
-use crate::pipeline::apparent::precondition::Precondition;
 use crate::solver::cg::fallback::minimise_or_fall_back;
 use crate::solver::cg::{CgInfo, CgParams, CgStep};
 

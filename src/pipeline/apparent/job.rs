@@ -7,11 +7,11 @@ use crate::pipeline::apparent::discretisation::yielded::{Kept, NotKept};
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, Prepared, System,
 };
+use crate::pipeline::apparent::ends::reactions::reactions;
 use crate::pipeline::apparent::equilibrium::{Observe, equilibrium};
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::mechanisms::mechanisms;
 use crate::pipeline::apparent::params::{Load, SolveParams};
-use crate::pipeline::apparent::reactions::reactions;
 use crate::pipeline::apparent::solved::{Moduli, Solved};
 use crate::pipeline::apparent::stiffness::{Stiffness, stiffness};
 use crate::pipeline::apparent::tissue::Tissue;

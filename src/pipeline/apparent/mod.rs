@@ -5,16 +5,14 @@
 
 pub mod checks;
 pub mod discretisation;
+pub mod ends;
 pub mod equilibrium;
 pub mod fields;
 pub mod geometry_fe;
 pub mod job;
 pub mod lattice;
 pub mod mechanisms;
-pub mod motion;
 pub mod params;
-pub mod precondition;
-pub mod reactions;
 pub mod resolution;
 pub mod solved;
 pub mod stiffness;

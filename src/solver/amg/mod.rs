@@ -45,6 +45,9 @@ pub struct AmgParams {
     pub degrees: [usize; 2],
     /// Sites at which a level is factorised instead of coarsened.
     pub coarsest: usize,
+    /// Cycles that solve an assembled level. Two halve the iterations (thin bone to 1e-6: 59 and 28), but with so few the estimate of the
+    /// error was 5.8 times too small on one of 193 hard bodies, a neck across a diagonal.
+    pub cycles: usize,
 }
 
 impl AmgParams {
@@ -56,6 +59,7 @@ impl AmgParams {
             box_mm: spacing_mm.map(|h| (5.0 * mean).max(h)),
             degrees: [2, 2],
             coarsest: 100,
+            cycles: 1,
         }
     }
 
@@ -66,6 +70,7 @@ impl AmgParams {
             box_mm: [4.0 * lp_mm; 3],
             degrees: [2, 2],
             coarsest: 100,
+            cycles: 1,
         }
     }
 }
@@ -123,9 +128,12 @@ impl<'a, O: Coarsen> Amg<'a, O> {
             room: Mutex::new(Vec::new()),
         };
         // A level's cycle is made of what solves the levels below.
-        for depth in (0..amg.coarse.len()).rev() {
-            let largest = CYCLE_MARGIN * amg.largest_of_cycle(depth, &mut rooms);
-            amg.coarse[depth].cycles = Chebyshev::new(largest.max(1.0), CYCLE_RANGE, CYCLES);
+        if params.cycles > 1 {
+            for depth in (0..amg.coarse.len()).rev() {
+                let largest = CYCLE_MARGIN * amg.largest_of_cycle(depth, &mut rooms);
+                amg.coarse[depth].cycles =
+                    Chebyshev::new(largest.max(1.0), CYCLE_RANGE, params.cycles);
+            }
         }
         amg.room = Mutex::new(rooms);
         amg
@@ -213,10 +221,7 @@ impl<O: Coarsen> Below for Plain<'_, O> {
     }
 }
 
-/// Cycles that solve an assembled level, and largest over smallest eigenvalue of a cycle that their polynomial is made
-/// for. Two cycles halve the iterations (thin bone to 1e-6: 59 and 28), but with so few iterations the estimate of the error was 5.8 times too
-/// small on one of 193 hard bodies (a neck across a diagonal), where it holds with one cycle. The estimate comes first.
-const CYCLES: usize = 1;
+/// Largest over smallest eigenvalue of a cycle that the polynomial of several is made for.
 const CYCLE_RANGE: f32 = 5.0;
 
 /// Steps that find a cycle's largest eigenvalue, and a margin over it: a polynomial of two cycles stays positive up to 1.2 times the

@@ -4,9 +4,9 @@ use crate::discretisation::tetrahedra::nodes::TetMesh;
 use crate::measure::stiffness::unit_strain;
 use crate::operator::held::Held;
 use crate::pipeline::apparent::discretisation::Displacements;
-use crate::pipeline::apparent::motion::EndMotion;
+use crate::pipeline::apparent::ends::motion::EndMotion;
+use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::params::{Conditions, Load};
-use crate::pipeline::apparent::reactions::End;
 use crate::pipeline::apparent::voxel_fe::supports::prescribed;
 
 /// Where the grips end along the load axis.

@@ -4,16 +4,16 @@ use crate::error::{Error, Result};
 use crate::measure::apparent::EndWork;
 use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::connected::{ConnectedLattice, ConnectedSprings};
+use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, Prepared, System,
 };
+use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded, SiteFields};
 use crate::pipeline::apparent::lattice::mixed_tissue::Blend;
 use crate::pipeline::apparent::lattice::stress::Stress;
 use crate::pipeline::apparent::lattice::{Placed, cost, label, refuse_unit_strains};
-use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
-use crate::pipeline::apparent::precondition::Precondition;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::lattice::{Case, build_connected};
 use crate::result::settings::Settings;

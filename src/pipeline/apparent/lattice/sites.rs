@@ -5,16 +5,16 @@ use crate::measure::apparent::EndWork;
 use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::Lattice;
 use crate::physics::lattice::multigrid::Springs;
+use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, Places, Prepared, System,
 };
+use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded, SiteFields};
 use crate::pipeline::apparent::lattice::mixed_tissue::Blend;
 use crate::pipeline::apparent::lattice::stress::Stress;
 use crate::pipeline::apparent::lattice::{Placed, cost, label, refuse_unit_strains};
-use crate::pipeline::apparent::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
-use crate::pipeline::apparent::precondition::Precondition;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::lattice::{Boundary, Case, build_of, site_values};
 use crate::result::settings::Settings;

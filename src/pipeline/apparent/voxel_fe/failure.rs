@@ -2,7 +2,7 @@
 
 use crate::measure::apparent::EndWork;
 use crate::measure::pistoia::Failure;
-use crate::pipeline::apparent::motion::EndMotion;
+use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
 use crate::result::details::FailureAt;
 

@@ -2,8 +2,8 @@
 
 use crate::discretisation::voxels::Planes;
 use crate::physics::hex8::fields::Deformed;
-use crate::pipeline::apparent::motion::EndMotion;
-use crate::pipeline::apparent::reactions::cross;
+use crate::pipeline::apparent::ends::motion::EndMotion;
+use crate::pipeline::apparent::ends::reactions::cross;
 use crate::result::details::SectionShare;
 use std::collections::BTreeMap;
 

@@ -4,9 +4,9 @@ use crate::discretisation::voxels::{Planes, VoxelMesh};
 use crate::measure::stiffness::unit_strain;
 use crate::operator::held::Held;
 use crate::pipeline::apparent::discretisation::Displacements;
-use crate::pipeline::apparent::motion::EndMotion;
+use crate::pipeline::apparent::ends::motion::EndMotion;
+use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::params::{Conditions, Load};
-use crate::pipeline::apparent::reactions::End;
 
 /// Unknowns that a motion of the ends holds, padding among them.
 pub fn held(mesh: &VoxelMesh, grips: Planes, motion: &EndMotion, load: Load) -> Held {

@@ -1,6 +1,6 @@
 //! Owns the forces and moments that the supports put on both ends.
 
-use crate::pipeline::apparent::motion::EndMotion;
+use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::result::details::EndForces;
 
 /// One end of a specimen along its load axis.

@@ -1,0 +1,4 @@
+//! The ends of a specimen: how they move, and what the supports put on them.
+
+pub mod motion;
+pub mod reactions;

@@ -125,7 +125,7 @@ pub struct SolveSettings {
     #[arg(long, value_name = "SHARE", value_parser = words::fraction, requires = "failure")]
     critical_volume: Option<f64>,
     /// Effective strain in that criterion
-    #[arg(long, value_name = "STRAIN", value_parser = words::positive, requires = "failure")]
+    #[arg(long, value_name = "STRAIN", value_parser = words::fraction, requires = "failure")]
     critical_strain: Option<f64>,
     /// voxel-fe: tissue that yields: von-mises:YIELD[,HARDENING], or asymmetric:TENSION,COMPRESSION[,HARDENING] (Drucker-Prager
     /// through both yield stresses), MPa; without HARDENING it is perfectly plastic. Per label as

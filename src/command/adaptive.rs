@@ -37,13 +37,10 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         tolerance: params.tolerance.min(0.1 * target),
         ..params.clone()
     };
-    let mut scan = OpenScan::open(dir, &smoothed_again(&params), false, session)?;
+    let mut scan = OpenScan::open(dir, &smoothed_again(&params), session.force, session)?;
     if !session.dry_run {
         // Notes of an earlier target.
         scan.results().edit_rows(ErrorTargetNote::remove_note)?;
-        if session.force {
-            scan.results().clear()?;
-        }
     }
     let mut climb = Climb {
         scan: &mut scan,

@@ -14,6 +14,7 @@ use crate::result::row::Row;
 use crate::result::settings::Settings;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The rows of a scan, or of a run, for other programs.
@@ -108,11 +109,13 @@ fn is_empty(details: &Details) -> bool {
 pub struct Results {
     dir: PathBuf,
     record: Record,
+    /// Where solves are to be made again: keys of those that were.
+    redone: Option<BTreeSet<String>>,
 }
 
 impl Results {
-    /// Opens the results in `dir`; empty where there are none, where they belong to another mask or version, or when
-    /// everything is to be redone.
+    /// Opens the results in `dir`; empty where there are none, or where they belong to another mask or version. With `redo` no
+    /// row is found before its solve was made again; rows of other settings stay.
     ///
     /// # Errors
     /// A mask that cannot be read.
@@ -123,21 +126,25 @@ impl Results {
             r.provenance.mask_blake3 == provenance.mask_blake3
                 && r.provenance.version == provenance.version
         };
-        let mut rows = old
-            .filter(|r| !redo && same(r))
-            .map_or(Vec::new(), |r| r.rows);
+        let mut rows = old.filter(same).map_or(Vec::new(), |r| r.rows);
         // Means are computed again from what was solved.
         rows.retain(|row| row.key.is_some());
         Ok(Results {
             dir: dir.to_path_buf(),
             record: Record { provenance, rows },
+            redone: redo.then(BTreeSet::new),
         })
     }
 
     /// The converged row that follows from the same settings, if it was made before. `blank` is the row before its
     /// solve.
     pub fn find(&self, blank: &Row, params: &SolveParams) -> Option<Row> {
-        let key = Some(key(blank, params));
+        let own = key(blank, params);
+        let is_old = |redone: &BTreeSet<String>| !redone.contains(&own);
+        if self.redone.as_ref().is_some_and(is_old) {
+            return None;
+        }
+        let key = Some(own);
         let same = |old: &&KeyedRow| old.key == key && old.row.converged() == Some(true);
         self.record
             .rows
@@ -180,6 +187,9 @@ impl Results {
         if let Some(KeyedRow { row: old, .. }) = self.record.rows.first() {
             (new.row.marks.group, new.row.marks.subject) =
                 (old.marks.group.clone(), old.marks.subject.clone());
+        }
+        if let Some(redone) = &mut self.redone {
+            redone.extend(new.key.clone());
         }
         self.record.provenance.date = host::date();
         match self.record.rows.iter_mut().find(|old| old.key == new.key) {
@@ -224,15 +234,6 @@ impl Results {
     /// BLAKE3 of the mask that the results are of.
     pub fn mask_blake3(&self) -> &str {
         &self.record.provenance.mask_blake3
-    }
-
-    /// Drops all rows.
-    ///
-    /// # Errors
-    /// Files that cannot be written.
-    pub fn clear(&mut self) -> Result<()> {
-        self.record.rows.clear();
-        self.write()
     }
 
     /// The solved rows, of all settings.

@@ -155,7 +155,11 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
             .solved
             .as_ref()
             .and_then(|s| s.strength.yield_stress_mpa),
-        threshold_sensitivity: row.solved.as_ref().and_then(|s| s.threshold_sensitivity),
+        threshold_sensitivity: row
+            .solved
+            .as_ref()
+            .filter(|s| s.e_app_mpa.is_some())
+            .and_then(|s| s.threshold_sensitivity),
         note,
         angle_deg: key.angle_deg,
         moment_nmm: row.solved.as_ref().and_then(|s| s.moment_nmm),

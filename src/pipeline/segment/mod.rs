@@ -25,8 +25,12 @@ use place::{Placed, place};
 use region::inside;
 use std::borrow::Cow;
 use window::{
-    bone_of, count, has_grey_values, no_label, nothing_selected, smoothed, takes_padding,
+    bone_of, count, has_grey_values, has_more_values_than, no_label, nothing_selected, smoothed,
+    takes_padding,
 };
+
+/// A labelled scan has fewer values.
+const MOST_LABELS: usize = 64;
 
 /// A segmented scan with its numbers.
 #[derive(Debug, Clone)]
@@ -127,6 +131,11 @@ pub fn segment_measured<'a>(
         warnings: Vec::new(),
     };
     summary.warnings = summary::warnings(&summary);
+    if !params.labels.is_empty() && has_more_values_than(MOST_LABELS, &placed.scan) {
+        summary.warnings.push(format!(
+            "the image holds more than {MOST_LABELS} values: it looks like a grey scan, of which --labels takes single grey values. Take --lower or --otsu, or the segmentation of the scan"
+        ));
+    }
     if params.has_window() {
         let voxels = grid.len() as u64;
         let padded = takes_padding(&placed.window, &placed.grey, voxels);

@@ -102,7 +102,7 @@ pub(super) fn warnings(s: &SegmentSummary) -> Vec<String> {
         let voxels = t / s.spacing_mm.iter().copied().fold(0.0, f64::max);
         if voxels < 3.0 {
             found.push(format!(
-                "struts are {voxels:.1} voxels thick on average (2 BV/BS = {t:.3} mm); under 3 voxels moduli are unreliable"
+                "struts are {voxels:.2} voxels thick on average (2 BV/BS = {t:.3} mm); under 3 voxels moduli are unreliable"
             ));
         }
     }

@@ -155,12 +155,17 @@ const LABELS: usize = 4;
 
 /// Whether an image holds grey values, and not a mask or a few labels.
 pub(super) fn has_grey_values(scan: &Volume<f32>) -> bool {
-    let mut found: Vec<f32> = Vec::with_capacity(LABELS + 1);
+    has_more_values_than(LABELS, scan)
+}
+
+/// Whether an image holds more than `most` values.
+pub(super) fn has_more_values_than(most: usize, scan: &Volume<f32>) -> bool {
+    let mut found: Vec<f32> = Vec::with_capacity(most + 1);
     for &v in scan.as_slice().iter().filter(|v| v.is_finite()) {
         if !found.contains(&v) {
             found.push(v);
         }
-        if found.len() > LABELS {
+        if found.len() > most {
             return true;
         }
     }

@@ -39,6 +39,7 @@ fn weakened(mesh: &VoxelMesh, solve: i32) -> Heterogeneous {
 fn supports(mesh: &VoxelMesh) -> (Held, Vec<[f64; 3]>) {
     let mut held = Held::none(mesh.len());
     let mut u = vec![[0.0; 3]; mesh.len()];
+    #[allow(clippy::needless_range_loop)] // The mesh is asked by number too.
     for node in 0..mesh.len() {
         let z = mesh.indices(node)[2] as usize;
         let exists = mesh.around[node] != 0;

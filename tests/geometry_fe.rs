@@ -54,7 +54,8 @@ fn gyroid(p: [f64; 3]) -> f64 {
 #[test]
 fn meshes_have_the_volume_and_the_topology_of_the_shape() {
     let n = [28; 3];
-    let shapes: [(fn([f64; 3]) -> f64, f64, i64); 3] = [
+    type Shape = (fn([f64; 3]) -> f64, f64, i64);
+    let shapes: [Shape; 3] = [
         (sphere, 4.0 / 3.0 * PI * 512.0, 1),
         (torus, 2.0 * PI * PI * 8.0 * 3.5 * 3.5, 0),
         (gyroid, 0.5 * 28.0f64.powi(3), -26),

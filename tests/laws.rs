@@ -385,7 +385,7 @@ fn yielding_row(law: YieldLaw) -> Model {
     ));
     let elastic = Elastic::of(1000.0, 0.3);
     let points = || Points::new(bone.grid.spacing_mm, true);
-    let mut body = PlasticBricks::new(&*bricks, &*mesh, points(), move |_| Tissue { elastic, law });
+    let mut body = PlasticBricks::new(bricks, mesh, points(), move |_| Tissue { elastic, law });
     // Strained unevenly, so that elements of one end flow and those of the other do not.
     let strained = |x: &[f64; 3]| [1e-4 * x[0], 2e-3 * x[1] * x[2], 8e-3 * x[2] * x[2] / 0.2];
     let u: Field = positions.iter().map(strained).collect();

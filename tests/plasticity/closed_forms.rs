@@ -119,7 +119,7 @@ fn a_thick_sphere_under_pressure_flows_as_the_closed_form_says() {
     };
     let inside = |p: [usize; 3]| radius(p) > a && radius(p) < b;
     let mut body = Body::new(mesh([n; 3], 1.0, inside), |at, axis| at[axis] == 0);
-    let pressure = 2.0 * flow * ((c / a as f64).ln() + (1.0 - (c / b as f64).powi(3)) / 3.0);
+    let pressure = 2.0 * flow * ((c / a).ln() + (1.0 - (c / b).powi(3)) / 3.0);
     body.forces = Some(inner_pressure(&body.mesh, pressure, |p| radius(p) <= a));
     let mut how = Body::stepping(6);
     // Under forces the balance of the energies is off by the root of this.

@@ -1,7 +1,7 @@
 //! The table of laws of yield, and what every one of them must obey. A new law is one row.
 
 use bonepd_ct::physics::plasticity::{
-    DruckerPrager, Elastic, Point, Response, Softening, Tensor, VonMises, YieldLaw,
+    DruckerPrager, Elastic, Point, Response, Tensor, VonMises, YieldLaw,
 };
 
 const YOUNG: f64 = 10_000.0;
@@ -53,10 +53,7 @@ fn cases() -> Vec<(Tensor, Point)> {
 }
 
 fn tangent(response: &Response) -> [Tensor; 6] {
-    response
-        .softening
-        .unwrap_or_else(Softening::default)
-        .tangent(&elastic())
+    response.softening.unwrap_or_default().tangent(&elastic())
 }
 
 #[test]

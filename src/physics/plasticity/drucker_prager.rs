@@ -61,7 +61,7 @@ impl DruckerPrager {
         let resists = 3.0 * shear + volumetric + self.growth();
         let multiplier = excess / resists;
         if 3.0 * shear * multiplier > trial.equivalent {
-            return Some(self.to_apex(elastic, trial, hardening));
+            return Some(self.at_apex(elastic, trial, hardening));
         }
         let shed = 3.0 * shear * multiplier / trial.equivalent;
         Some(Flow {
@@ -79,7 +79,7 @@ impl DruckerPrager {
     }
 
     /// Of a trial stress beyond the tip of the cone, where no shear is left.
-    fn to_apex(&self, elastic: &Elastic, trial: &Trial, hardening: f64) -> Flow {
+    fn at_apex(&self, elastic: &Elastic, trial: &Trial, hardening: f64) -> Flow {
         let (a, bulk) = (self.slope(), elastic.bulk_mpa);
         let volumetric = 9.0 * bulk * a * a;
         let resists = volumetric + self.growth();

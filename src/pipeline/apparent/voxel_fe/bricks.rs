@@ -38,6 +38,8 @@ impl Keep {
 }
 
 /// One brick per voxel, or finer or coarser ones.
+// One is made a solve: its size on the stack does not matter.
+#[allow(clippy::large_enum_variant)]
 pub enum Bricks {
     Homogeneous(Hex8),
     Heterogeneous(Heterogeneous),

@@ -82,7 +82,7 @@ struct Assembled {
     cycles: Chebyshev,
 }
 
-/// `z ≈ A⁻¹ r` by one symmetric cycle. Its coarse problems are solved by several cycles each ([`accelerated`]).
+/// `z ≈ A⁻¹ r` by one symmetric cycle. Its coarse problems are solved by one cycle each, or by several in a polynomial.
 pub struct Amg<'a, O> {
     fine: Fine<'a, O>,
     how: Smoothing,

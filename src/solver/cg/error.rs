@@ -11,7 +11,7 @@
 /// eigenvalue is approached from above by `θ_k`, the smallest one of the tridiagonal matrix that the coefficients make up
 /// (Lanczos), so `θ_k` alone would promise too much where it still falls. It is taken to fall once more as it has since
 /// two thirds of the iterations, and a motion as soft as `k` iterations can miss is always expected to be there:
-/// `μ = min(θ_k² / θ_{2k/3}, (π / 2k)² θ_1) / 2.25`. The divisor was set on 177 hard bodies (`reports/stability.md`).
+/// `μ = min(θ_k² / θ_{2k/3}, (π / 2k)² θ_1) / 2.25`. The divisor was set on 195 hard bodies (`reports/stability.md`).
 #[derive(Debug, Clone)]
 pub struct EnergyTail {
     /// The Lanczos matrix: diagonal, and squares of what stands beside it.
@@ -53,7 +53,7 @@ fn unseen(k: usize) -> f64 {
     (std::f64::consts::FRAC_PI_2 / k as f64).powi(2)
 }
 
-/// What the estimate is multiplied by: with it the true error passes the stated one on 2 of 177 hard bodies at some tolerance
+/// What the estimate is multiplied by: with it the true error passes the stated one on 2 of 195 hard bodies at some tolerance
 /// from 1e-2 to 1e-5, by half at most.
 const SAFETY: f64 = 2.25;
 

@@ -106,7 +106,7 @@ const ANSWERS: [Column; 25] = [
     column(
         "method",
         "",
-        "floppy, firm, ffb, graded, voxel-fe, graded-extrapolated, voxel-fe-extrapolated",
+        "floppy, firm, ffb, graded (connected on sc, weighted on bcc and fcc), voxel-fe, geometry-fe, graded-extrapolated, voxel-fe-extrapolated",
     ),
     column(
         "element_mm",
@@ -173,7 +173,7 @@ const RESULTS: [Column; 62] = [
     column(
         "e_app_mpa",
         "MPa",
-        "the result: from the energy (floppy, graded, voxel-fe), from the stress of the fully coordinated sites (firm)",
+        "the result: from the energy (all but firm), from the stress of the fully coordinated sites (firm)",
     ),
     column(
         "e_app_reaction_mpa",

@@ -96,12 +96,12 @@ fn methods_in_words(lines: &[AnswerLine]) -> Vec<String> {
 pub fn method_words(method: &str) -> &str {
     match method {
         "ffb" => "FFB mean",
-        "graded" => "graded lattice",
+        "graded" => "connected or weighted lattice",
         "floppy" => "floppy lattice",
         "firm" => "firm lattice",
         "voxel-fe" => "voxel FE",
         "geometry-fe" => "geometry-based FE",
-        "graded-extrapolated" => "graded lattices, extrapolated",
+        "graded-extrapolated" => "connected or weighted lattices, extrapolated",
         "voxel-fe-extrapolated" => "voxel FE, extrapolated",
         other => other,
     }

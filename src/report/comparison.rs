@@ -314,14 +314,14 @@ mod tests {
             "bland-altman-percent-firm",
             "bland-altman-ffb-mean",
             "bland-altman-percent-ffb-mean",
-            "bland-altman-graded-extrapolated",
-            "bland-altman-percent-graded-extrapolated",
+            "bland-altman-connected-extrapolated",
+            "bland-altman-percent-connected-extrapolated",
         ];
         assert_eq!(stems(&figures), expected);
         let Content::Groups(groups) = &figures[0].content else {
             panic!("methods are side by side");
         };
-        assert_eq!(groups[3].label, "graded, extrapolated (n = 4)");
+        assert_eq!(groups[3].label, "connected, extrapolated (n = 4)");
         let Content::Curves(curves) = &figures[1].content else {
             panic!("curves are curves");
         };
@@ -329,7 +329,7 @@ mod tests {
             let found = curves.iter().find(|c| c.name == name);
             found.map(|c| (c.hue % 7, c.shape % 7))
         };
-        let [graded, ffb] = ["graded, extrapolated", "FFB mean"].map(|n| look(n).unwrap());
+        let [graded, ffb] = ["connected, extrapolated", "FFB mean"].map(|n| look(n).unwrap());
         assert!(graded.0 != ffb.0 && graded.1 != ffb.1, "{graded:?} {ffb:?}");
     }
 }

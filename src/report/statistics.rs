@@ -109,7 +109,7 @@ fn common(samples: &[Sample]) -> impl Iterator<Item = &Sample> {
     samples.iter().filter(move |s| 2 * s.cases.len() > most)
 }
 
-/// What the others are compared with: of voxel FE and the limits the one of the least stated error, else graded, else FFB.
+/// What the others are compared with: of voxel FE and the limits the one of the least stated error, else connected or weighted lattices, else FFB.
 pub(super) fn reference(samples: &[Sample]) -> Option<&Sample> {
     let of = |model| common(samples).filter(move |s| s.model == model);
     // The first of equals is taken.

@@ -140,7 +140,7 @@ fn all_are_held_against_an_independent_reference() {
 
 #[test]
 fn two_limits_are_two_methods_and_the_one_of_less_error_is_the_reference() {
-    let (graded, fe) = ("graded, extrapolated", "voxel FE, extrapolated");
+    let (graded, fe) = ("connected, extrapolated", "voxel FE, extrapolated");
     for (of_graded, of_fe, expected) in [(0.05, 0.02, fe), (0.02, 0.05, graded), (0.02, 0.02, fe)] {
         let rows = with_limit(cohort(4), Method::Lattice, of_graded);
         let rows = with_limit(rows, Method::VoxelFe, of_fe);

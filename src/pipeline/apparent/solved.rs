@@ -164,6 +164,7 @@ impl Solved {
         Row {
             solved: Some(solution),
             marks: Marks {
+                is_no_answer: self.no_answer,
                 note: self.all_notes(&blank.key),
                 ..blank.marks
             },

@@ -180,7 +180,7 @@ pub fn statistics(samples: &[Sample]) -> Statistics {
     });
     let differences = pairs.iter().filter_map(|c| {
         Some(RegressionLine {
-            y: format!("{}, {}", c.sample.method, c.difference_from()),
+            y: format!("{}: {}", c.sample.method, c.difference_from()),
             x: "BV/TV".to_owned(),
             fit: regression(&c.bv_tv, &c.differences_percent())?,
         })

@@ -122,7 +122,7 @@ fn all_are_held_against_an_independent_reference() {
     let line = found
         .regressions
         .iter()
-        .find(|r| r.y == format!("floppy, {percent}"))
+        .find(|r| r.y == format!("floppy: {percent}"))
         .unwrap();
     assert_eq!((line.x.as_str(), line.fit.n), ("BV/TV", 4));
     // Of s1: floppy 10.1, and the limit 1.3 times its coarser 10.2 with 10 more for its bone.

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::io::{atomic, table};
 use crate::machine::host;
 use crate::machine::session::Session;
+use crate::measure::pistoia::Pistoia;
 use crate::pipeline::apparent::SolveParams;
 use crate::record::{details, specimen};
 use crate::result::derived::with_derived;
@@ -57,6 +58,17 @@ pub fn details(dir: &Path) -> Vec<(Settings, Details)> {
     let rows = Record::read(dir).map_or(Vec::new(), |record| record.rows);
     let of = |keyed: KeyedRow| (keyed.row.key, keyed.details);
     rows.into_iter().map(of).collect()
+}
+
+/// Criteria by which failure loads in `dir` were found, each with the labels whose bone counts.
+pub fn criteria(dir: &Path) -> Vec<(Pistoia, Vec<i32>)> {
+    let rows = Record::read(dir).map_or(Vec::new(), |record| record.rows);
+    let of = |keyed: KeyedRow| {
+        keyed.row.failure()?;
+        let settings = keyed.settings?;
+        Some((settings.pistoia?, settings.failure_labels))
+    };
+    rows.into_iter().filter_map(of).collect()
 }
 
 /// Writes `results.csv`; an older one that was set aside goes.

@@ -6,6 +6,7 @@ mod group_tables;
 pub mod groups;
 pub mod html;
 pub mod markdown;
+pub mod methods;
 pub mod plot;
 
 mod answer_figures;

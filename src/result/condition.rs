@@ -26,8 +26,8 @@ pub enum Tissue {
     Law(String),
 }
 
-/// The program's default, which no study should take for bone's without a thought.
-const DEFAULT_YOUNG_MPA: f64 = 1000.0;
+/// The program's default, a round number: not the modulus of bone tissue.
+pub const DEFAULT_YOUNG_MPA: f64 = 1000.0;
 
 impl Condition {
     pub fn of(key: &Settings) -> Condition {

@@ -2,6 +2,7 @@
 
 mod commands;
 mod links;
+mod paper;
 mod prose;
 
 use std::fs;

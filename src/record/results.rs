@@ -28,7 +28,7 @@ const RECORD: &str = "results.json";
 pub const OLD_TABLE: &str = "results.old.csv";
 
 /// Renames `results.csv`, whose rows no longer belong to what else is in the folder, so that nothing takes them for
-/// current; tables beside it go. True if there was one.
+/// current; the tables that belong to it are removed. True if there was one.
 pub fn set_aside(dir: &Path) -> bool {
     details::remove(dir);
     std::fs::rename(dir.join(TABLE), dir.join(OLD_TABLE)).is_ok()

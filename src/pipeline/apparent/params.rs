@@ -1,4 +1,4 @@
-//! Owns the settings of a solve: material, load, supports, accuracy, and what is wanted besides the modulus.
+//! Owns the settings of a solve: material, load, supports, accuracy, and what is wanted in addition to the modulus.
 
 use crate::grid::Axis;
 use crate::io::percent;

@@ -77,7 +77,7 @@ impl<const D: usize> Window<D> {
             .iter()
             .enumerate()
             .for_each(|(k, &p)| local[p] = k as u32);
-        // Beside held points a crack cannot leave the window: their bonds never break.
+        // Next to held points a crack cannot leave the window: their bonds never break.
         let held_at = |q: usize| (0..D).any(|d| held[q * D + d].is_some());
         let inside = |q: usize| local[q] != OUTSIDE || held_at(q);
         let whole = |&p: &usize| setup.family.of(p).all(|(q, _)| inside(q));

@@ -1,5 +1,7 @@
 //! `methods.md` through the built program: what it says is what was done.
 
+mod settings;
+
 use crate::cli::run;
 use crate::cohort::{cohort, text};
 use std::fs;

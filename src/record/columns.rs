@@ -15,7 +15,7 @@ use crate::record::detail_columns;
 pub const FILES: [File; 18] = [
     File {
         name: "answers.csv",
-        about: "one row a scan: its apparent modulus with all of its stated error, by the row of the least stated error",
+        about: "one row for each scan: its apparent modulus with its stated error, from the row with the smallest stated error",
         columns: &ANSWERS,
     },
     File {
@@ -192,7 +192,7 @@ const RESULTS: [Column; 61] = [
     column(
         "discretization_error_mpa",
         "MPa",
-        "estimated error of the resolution; of ffb half the gap between floppy and firm, NA where they are shown to be no bracket",
+        "estimated error of the resolution; of ffb half the gap between floppy and firm, NA where the answer was found not to lie between them",
     ),
     column(
         "wall_s",
@@ -245,7 +245,7 @@ const RESULTS: [Column; 61] = [
     column(
         "shape_error_mpa",
         "MPa",
-        "what voxels and the scan's blur leave open about the bone's surface",
+        "uncertainty of the bone's surface, from voxels and the scan's blur",
     ),
     column(
         "error_mpa",

@@ -47,7 +47,7 @@ pub fn set_aside_stale(dir: &Path, session: &Session) {
     let stale = !session.dry_run && old.provenance.mask_blake3 != now.mask_blake3;
     if stale && set_aside(dir) {
         session.say(format!(
-            "{}: the mask is another one: the results of the old one are set aside as {OLD_TABLE}",
+            "{}: the mask has changed: the results of the old mask are set aside as {OLD_TABLE}",
             dir.display()
         ));
     }

@@ -115,7 +115,7 @@ fn bland_altman(c: &Comparison) -> Figure {
         folded: true,
         title: format!("{method} against {reference}"),
         caption: format!(
-            "{method} less {reference} over the mean of both (Bland and Altman), {n} scans, with the mean difference and its limits of agreement."
+            "{method} minus {reference} over the mean of both (Bland and Altman), {n} scans, with the mean difference and its limits of agreement."
         ),
         x: Axis::linear("mean of both (MPa)"),
         y: Axis::linear("difference (MPa)"),

@@ -110,7 +110,7 @@ const SERIOUS: [&str; 6] = [
     "not converged",
     "mean of a modulus",
     "no path",
-    "what connects",
+    "only a mechanism",
     "the error asked for",
 ];
 

@@ -98,7 +98,7 @@ impl Condition {
                 rounded(100.0 * self.strain)
             ),
             Motion::Tilt(about) => format!(
-                "Bending about {}: both end planes across {axis} tilt by {}°, opposite ways",
+                "Bending about {}: both end planes across {axis} tilt by {}° in opposite directions",
                 about.name(),
                 rounded(0.5 * angle)
             ),

@@ -57,7 +57,7 @@ fn load(c: &Condition) -> String {
         ),
         Motion::Tilt(about) => held(
             &format!(
-                "Specimens were bent about {}: both ends across {axis} tilted by {}°, opposite ways",
+                "Specimens were bent about {}: both ends across {axis} tilted by {}° in opposite directions",
                 about.name(),
                 setting(0.5 * angle)
             ),

@@ -194,6 +194,3 @@ impl Methods {
         text
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,12 +1,13 @@
 //! What the section says follows each setting: every row of the table below changes one and names the words that follow.
 
-use super::*;
-use crate::discretisation::lattice::stencil::Structure;
-use crate::grid::Axis;
-use crate::report::{ReportParams, answers, report};
-use crate::result::answer::ScanFacts;
-use crate::result::row::{FailureLoad, Solution};
-use crate::result::settings::{
+use bonepd_ct::discretisation::lattice::stencil::Structure;
+use bonepd_ct::grid::Axis;
+use bonepd_ct::measure::pistoia::Pistoia;
+use bonepd_ct::report::methods::{Criterion, Known, Segmented, Threshold, methods};
+use bonepd_ct::report::{ReportParams, answers, report};
+use bonepd_ct::result::answer::ScanFacts;
+use bonepd_ct::result::row::{FailureLoad, Row, Solution};
+use bonepd_ct::result::settings::{
     BoundaryRule, CellType, Conditions, Elements, Ends, Load, Method, Sed, Settings, Supports,
 };
 

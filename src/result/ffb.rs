@@ -119,7 +119,7 @@ fn both_converged(a: &Solution, b: &Solution) -> Option<bool> {
     }
 }
 
-/// A mean of an unconverged modulus must say so, and what its parts are warned of it is warned of, too.
+/// A mean of an unconverged modulus must say so, and has the warnings of its parts.
 fn note(a: &Row, b: &Row) -> Option<String> {
     let mut note = None;
     let parts = || [a, b].into_iter();

@@ -55,3 +55,14 @@ fn the_papers_citations_are_known_and_used() {
         assert!(cited.contains(key), "{key} is not cited");
     }
 }
+
+/// The version and the authors are those of the crate and of the paper.
+#[test]
+fn the_citation_is_of_this_version() {
+    let citation = read("CITATION.cff");
+    let version = format!("version: {}", env!("CARGO_PKG_VERSION"));
+    assert!(citation.lines().any(|line| line == version), "{version}");
+    let author = "The bonepd-ct maintainers";
+    assert!(citation.contains(&format!("name: \"{author}\"")));
+    assert!(read("paper.md").contains(&format!("name: {author}")));
+}

@@ -58,7 +58,7 @@ const TOLERANCE: f64 = 1e-8;
 
 impl<const D: usize> Window<D> {
     /// Factorises `body` as it is and condenses it onto `chosen` points (none of whose values is held). Returns the
-    /// solution under unit load, too.
+    /// solution under unit load as well.
     pub fn new(
         body: &Body<D>,
         setup: &Setup,

@@ -87,7 +87,7 @@ fn the_usual_case_has_all_its_numbers() {
         "Young's modulus of 8748 MPa and a Poisson's ratio of 0.3 everywhere",
         "compressed along z by 1 % of the free length: the end planes moved along the axis and were free to slide sideways without friction; the sides were free.",
         "algebraic error of E_app was below 0.1 % (Meurant and Tichý 2019)",
-        "was 12.0 %.",
+        "The stated error of E_app was 12.0 %;",
         "E_app changes by 1.50 % per 1 % of bone volume.",
         "The bonepd-ct maintainers: bonepd-ct 9.8.7.",
         "Meurant, G.",
@@ -266,7 +266,7 @@ const ROWS: &[RowCase] = &[
     (
         |r| r.solved.as_mut().unwrap().discretization_error_mpa = None,
         &["No discretisation error is stated."],
-        &["The stated error of E_app,"],
+        &["The stated error of E_app was"],
     ),
     (
         |r| r.solved.as_mut().unwrap().converged = Some(false),
@@ -301,17 +301,17 @@ const ROWS: &[RowCase] = &[
     (
         |r| lattice(r, Structure::Sc, BoundaryRule::Floppy),
         &["simple cubic", "parameter of 0.06 mm", "(floppy boundary,"],
-        &["hexahedral", "firm", "FFB"],
+        &["hexahedral", "(firm", "(FFB"],
     ),
     (
         |r| lattice(r, Structure::Bcc, BoundaryRule::Firm),
         &["body-centred", "(firm boundary,", "Zojaji, M."],
-        &["floppy", "FFB"],
+        &["(floppy", "(FFB"],
     ),
     (
         |r| lattice(r, Structure::Fcc, BoundaryRule::Ffb),
         &["face-centred", "(FFB, Zojaji"],
-        &["connected"],
+        &["(connected"],
     ),
     (
         |r| lattice(r, Structure::Sc, BoundaryRule::Graded),
@@ -321,7 +321,7 @@ const ROWS: &[RowCase] = &[
     (
         |r| lattice(r, Structure::Bcc, BoundaryRule::Graded),
         &["(weighted boundary)"],
-        &["connected", "Zojaji"],
+        &["(connected", "Zojaji"],
     ),
 ];
 
@@ -369,8 +369,8 @@ const SCANS: &[ScanCase] = &[
     ),
     (|s| s.gaussian_voxels = 1.0, &["(σ = 1 voxel)"], &["0.8"]),
     (
-        |s| s.threshold = Threshold::Otsu { at: Some(107.25) },
-        &["Otsu's threshold (Otsu 1979), 107.25 HU", "Otsu, N."],
+        |s| s.threshold = Threshold::Otsu { at: Some(107.254) },
+        &["Otsu's threshold (Otsu 1979), 107.3 HU", "Otsu, N."],
         &["210"],
     ),
     (

@@ -4,15 +4,16 @@ use super::{pages, root, spans};
 use crate::cli::{bonepd, run};
 use std::collections::BTreeSet;
 
-/// Command lines in blocks of code, with the number of their line: the words after the program's name.
+/// Command lines in blocks of code, fenced or indented, with the number of their line: the words after the program's name.
 fn commands(page: &str) -> Vec<(usize, Vec<String>)> {
     let mut found = Vec::new();
     let mut is_shell = false;
     for (i, line) in page.lines().enumerate() {
+        let is_indented = line.starts_with("    ");
         let line = line.trim();
         if let Some(language) = line.strip_prefix("```") {
             is_shell = !is_shell && language == "sh";
-        } else if is_shell {
+        } else if is_shell || is_indented {
             let after = line
                 .strip_prefix("bonepd-ct ")
                 .or_else(|| line.strip_prefix("cargo run --release -- "));
@@ -55,9 +56,10 @@ fn refused(words: &[String], dir: &std::path::Path) -> Option<String> {
         .output()
         .unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    // A recipe of the reader's own, or RECIPE for any.
     let own_recipe = words
         .iter()
-        .any(|w| w.ends_with(".toml") && !w.starts_with("pipelines/"));
+        .any(|w| w == "RECIPE" || w.ends_with(".toml") && !w.starts_with("pipelines/"));
     let no_recipe = !own_recipe && stderr.contains("expected a recipe");
     let is_wrong = stderr.contains(UNUSABLE) || no_recipe || output.status.code() == Some(101);
     is_wrong.then_some(stderr)

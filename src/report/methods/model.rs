@@ -136,8 +136,8 @@ fn lattice(report: &Report, rows: &[&Row], boundary: BoundaryRule, sizes: &str) 
     };
     let thickness = rows.iter().filter_map(|row| row.marks.mean_thickness_mm);
     let thickness: Vec<f64> = thickness.collect();
-    let struts = match super::words::mean_and_range(&thickness, 1.0) {
-        Some(words) => format!(" (strut thickness 2 BV/BS: {words} mm)"),
+    let struts = match super::words::mean_and_range(&thickness, "mm") {
+        Some(words) => format!(" (strut thickness 2 BV/BS: {words})"),
         None => String::new(),
     };
     format!(

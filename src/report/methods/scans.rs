@@ -142,7 +142,8 @@ fn threshold(of: &[&Segmented], unit: &str) -> String {
         let bound = |s: &&Segmented| match &s.threshold {
             Threshold::Window { upper: Some(v), .. } if upper => Some(*v),
             Threshold::Window { lower: Some(v), .. } if !upper => Some(*v),
-            Threshold::Otsu { at } => *at,
+            // Its digits follow from the histogram; four are plenty.
+            Threshold::Otsu { at } => at.map(|v| format!("{v:.3e}").parse().unwrap_or(v)),
             _ => None,
         };
         settings(of.iter().filter_map(bound))

@@ -54,9 +54,9 @@ fn errors(answered: &[Answered], target: Option<f64>) -> String {
     let (loaded, empty): (Vec<&Answered>, Vec<&Answered>) =
         answered.iter().partition(|a| !a.row.is_disconnected());
     let stated: Vec<f64> = loaded.iter().filter_map(|a| a.line.error_percent).collect();
-    let mut text = match mean_and_range(&stated, 1.0) {
+    let mut text = match mean_and_range(&stated, "%") {
         Some(words) => format!(
-            " The stated error of E_app, the sum of what is estimated of the solver, of the size of elements or lattice cells, and of the surface of bone within a voxel, was {words} %."
+            " The stated error of E_app was {words}; it adds the estimated errors of the solver, of the size of elements or lattice cells, and of the surface of bone within a voxel."
         ),
         None => String::new(),
     };
@@ -78,9 +78,9 @@ fn errors(answered: &[Answered], target: Option<f64>) -> String {
     }
     let sensitivity = loaded.iter().filter_map(|a| a.line.threshold_sensitivity);
     let sensitivity: Vec<f64> = sensitivity.collect();
-    if let Some(words) = mean_and_range(&sensitivity, 1.0) {
+    if let Some(words) = mean_and_range(&sensitivity, "%") {
         text += &format!(
-            " The threshold is not part of that error: E_app changes by {words} % per 1 % of bone volume."
+            " The threshold is not part of that error: E_app changes by {words} per 1 % of bone volume."
         );
     }
     if !empty.is_empty() {

@@ -64,23 +64,20 @@ pub fn settings(values: impl IntoIterator<Item = f64>) -> String {
     }
 }
 
-/// Mean and range of results, times `scale`; None without any.
-pub fn mean_and_range(values: &[f64], scale: f64) -> Option<String> {
+/// Mean and range of results in a unit; None without any.
+pub fn mean_and_range(values: &[f64], unit: &str) -> Option<String> {
     let n = values.len();
-    let mean = scale * values.iter().sum::<f64>() / n as f64;
-    let ends = values
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-            [low.min(*v), high.max(*v)]
-        });
+    let mean = values.iter().sum::<f64>() / n as f64;
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     match n {
         0 => None,
-        1 => Some(result(mean)),
+        1 => Some(format!("{} {unit}", result(mean))),
         _ => Some(format!(
-            "{} in the mean ({} to {})",
+            "{} {unit} in the mean ({} to {} {unit})",
             result(mean),
-            result(scale * ends[0]),
-            result(scale * ends[1])
+            result(low),
+            result(high)
         )),
     }
 }

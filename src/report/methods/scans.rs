@@ -11,11 +11,11 @@ pub fn text(report: &Report, known: &Known) -> String {
         return text;
     }
     text += &format!(" {}.", voxels(all));
-    text += &by_scan(all, |s| &s.scan, |s| placed(s));
-    text += &by_scan(all, |s| &s.scan, |s| smoothed(s));
+    text += &by_scan(all, |s| &s.scan, placed);
+    text += &by_scan(all, |s| &s.scan, smoothed);
     text += &thresholds(all);
     text += &by_scan(all, |s| &s.scan, |s| Some(volume_of_interest(s)));
-    text += &by_scan(all, |s| &s.scan, |s| flat_ends(s));
+    text += &by_scan(all, |s| &s.scan, flat_ends);
     text += &connected(all);
     if all.iter().any(|s| s.has_morphometry) {
         text += " Trabecular thickness and separation were measured by largest spheres (Hildebrand and Rüegsegger 1997), connectivity density by the Euler characteristic, and the degree of anisotropy by mean intercept lengths.";

@@ -82,7 +82,7 @@ fn a_run_by_voxels_says_its_settings() {
 #[test]
 fn a_target_and_other_methods_are_said() {
     let said = methods("[segment]\nlower = 500.0\n", &["--error", "40%"]);
-    has(&said, &["at most 40 %; this was met on"]);
+    has(&said, &["exceeded 40 %; this target was met on"]);
 }
 
 /// `report` on one solved scan: the settings of the solve, not those of a recipe.

@@ -476,7 +476,7 @@ fn a_cohort_says_where_its_scans_differ() {
         "5600 HU were bone (of a and b).",
         "99 HU (of c).",
         "Further solves of these scans, under other conditions, are not described here (axis y).",
-        "at most 10 %; this was met on 0 of 4.",
+        "exceeded 10 %; this target was met on 0 of 4.",
         "The segmentation of d: the folder was not found.",
         "mean ± standard deviation over subjects",
     ] {

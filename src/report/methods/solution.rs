@@ -72,7 +72,7 @@ fn errors(answered: &[Answered], target: Option<f64>) -> String {
         let met = answered.iter().filter(|a| a.line.met == Some(true)).count();
         let asked = answered.iter().filter(|a| a.line.met.is_some()).count();
         text += &format!(
-            " The size of elements was reduced until the stated error was at most {} %; this was met on {met} of {asked}.",
+            " Elements were refined where the stated error exceeded {} %; this target was met on {met} of {asked}.",
             setting(100.0 * target)
         );
     }

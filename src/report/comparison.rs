@@ -192,7 +192,7 @@ fn bland_altman(c: &Comparison) -> Figure {
         stem: format!("bland-altman-{}", file_words(method)),
         title: format!("{method} against {reference}"),
         caption: format!(
-            "{method} less {reference} over the mean of both (Bland and Altman), {} scans, with the mean difference and its limits of agreement.",
+            "{method} minus {reference} over the mean of both (Bland and Altman), {} scans, with the mean difference and its limits of agreement.",
             differences.len()
         ),
         y: Axis::linear("difference (MPa)"),
@@ -223,7 +223,7 @@ fn bland_altman_percent(c: &Comparison) -> Figure {
         stem: format!("bland-altman-percent-{}", file_words(method)),
         title: format!("{method} against {reference}, in percent"),
         caption: format!(
-            "{method} less {reference} in percent of the mean of both, {} scans, with the mean difference and its limits of agreement.{tested}",
+            "{method} minus {reference} in percent of the mean of both, {} scans, with the mean difference and its limits of agreement.{tested}",
             differences.len()
         ),
         y: Axis::linear("difference (% of the mean)"),

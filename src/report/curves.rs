@@ -147,7 +147,7 @@ fn convergence_of(scan: &str, solved: &[SolvedRow]) -> Figure {
         scan: Some(scan.to_owned()),
         title: format!("Convergence of {scan}"),
         caption: format!(
-            "Apparent modulus against lattice parameter (element size for voxel FE). Bars: all of the stated error, down to 0 at most; level lines: limits.{}",
+            "Apparent modulus against lattice parameter (element size for voxel FE). Bars: stated error, cut off at 0; horizontal lines: limits.{}",
             tissue(&found)
         ),
         x: Axis::linear("lattice parameter (mm)"),

@@ -6,6 +6,7 @@ mod group_tables;
 pub mod groups;
 pub mod html;
 pub mod markdown;
+pub mod methods;
 pub mod plot;
 
 mod answer_figures;
@@ -109,7 +110,7 @@ const SERIOUS: [&str; 6] = [
     "not converged",
     "mean of a modulus",
     "no path",
-    "what connects",
+    "only a mechanism",
     "the error asked for",
 ];
 

@@ -188,7 +188,7 @@ fn a_mean_beside_its_parts_is_no_level_of_an_analysis_of_variance() {
     );
     let said = found.analysis_of_variance().unwrap();
     assert!(said.contains("floppy; firm over 4 scans"), "{said}");
-    // Beside one part only it is a level of its own.
+    // With one part only it is a level of its own.
     rows.retain(|row| row.key.boundary != Some(BoundaryRule::Firm));
     assert_eq!(of(&rows).anova_between, ["floppy", "FFB mean"]);
 }

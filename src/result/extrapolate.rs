@@ -157,7 +157,7 @@ fn voxel_limit(levels: &[Level]) -> Option<(f64, f64, String)> {
     let step = (coarse.e_mpa - fine.e_mpa) / (ratio - 1.0);
     let e = fine.e_mpa - step;
     let words = format!(
-        "limit of the voxel staircase, not of the bone, from elements of {:.4} and {:.4} mm, order {VOXEL_ORDER}; {STEP_LEFT} of the step of {:.3} MPa from the finest is left open",
+        "limit of the voxel staircase, not of the bone, from elements of {:.4} and {:.4} mm, order {VOXEL_ORDER}; uncertain by {STEP_LEFT} of the step of {:.3} MPa from the finest",
         coarse.size,
         fine.size,
         step.abs(),
@@ -201,7 +201,7 @@ fn lattice_limit(levels: &[Level], finest: &Row) -> Option<(f64, f64, String)> {
     let struts = FEW_STRUTS * e * thickness / finest.key.tv_mm3.cbrt();
     let sizes: Vec<String> = levels.iter().rev().map(|l| l.size.to_string()).collect();
     let words = format!(
-        "limit of {} lattices at LP {} mm, order 2 in LP ({}); left open: {step:.3} MPa from the finest, scatter {scatter:.3}, voxels {voxels:.3}, few struts {struts:.3}",
+        "limit of {} lattices at LP {} mm, order 2 in LP ({}); parts of the error in MPa: step from the finest {step:.3}, scatter {scatter:.3}, voxels {voxels:.3}, few struts {struts:.3}",
         BoundaryRule::Graded.method_name(finest.key.structure),
         sizes.join(", "),
         fitted_order(levels).map_or("none could be fitted".into(), |p| format!("fitted {p:.1}")),

@@ -119,7 +119,7 @@ fn both_converged(a: &Solution, b: &Solution) -> Option<bool> {
     }
 }
 
-/// A mean of an unconverged modulus must say so, and what its parts are warned of it is warned of, too.
+/// A mean of an unconverged modulus must say so, and has the warnings of its parts.
 fn note(a: &Row, b: &Row) -> Option<String> {
     let mut note = None;
     let parts = || [a, b].into_iter();
@@ -134,7 +134,7 @@ fn note(a: &Row, b: &Row) -> Option<String> {
     } else if only_one_carries(a, b) {
         notes::add(
             &mut note,
-            "no mean: one of its lattices carries no load, and half of the other is no estimate",
+            "no mean: one of its lattices carries no load, so half of the other's modulus would be no estimate",
         );
     }
     let all = parts().flat_map(|row| notes::parts(row.marks.note.as_deref()));

@@ -224,7 +224,7 @@ impl Solved {
             Ended::IterationLimit => Some("not converged: iteration limit reached".into()),
             Ended::Breakdown => Some("not converged: the model is not positive definite".into()),
             Ended::Mechanism => Some(format!(
-                "what connects the loaded faces only turns and shifts: {zero} to rounding"
+                "only a mechanism connects the loaded faces (parts that turn and shift freely): {zero} to rounding"
             )),
             Ended::EnergyTolerance | Ended::ResidualTolerance => None,
         }

@@ -337,7 +337,7 @@ impl OpenScan {
             return;
         };
         let whole = |key: &&Settings| {
-            [Some(BoundaryRule::FIRM), Some(BoundaryRule::FLOPPY)].contains(&key.boundary)
+            [Some(BoundaryRule::Firm), Some(BoundaryRule::Floppy)].contains(&key.boundary)
         };
         let coarse = |key: &&Settings| key.lp_mm > 0.5 * thickness;
         let keys = blanks.map(|row| &row.key).filter(whole).filter(coarse);
@@ -475,7 +475,10 @@ fn metered(mut row: Row, meter: &Meter) -> Row {
 /// What a row is solved with, in short.
 fn name(key: &Settings) -> String {
     match key.boundary {
-        Some(boundary) => format!("{} {}", key.structure.name(), boundary.name()),
+        Some(boundary) => {
+            let method = boundary.method_name(key.structure);
+            format!("{} {method}", key.structure.name())
+        }
         None => key.structure.name().to_owned(),
     }
 }

@@ -3,6 +3,7 @@
 mod groups;
 mod methods;
 
+use crate::io::own_files;
 use crate::record::column::{
     ANGLE, AXIS, BOUNDARY, BV_TV, ENDS, FAILURE_DISPLACEMENT, FAILURE_FACTOR, FAILURE_LOAD,
     FAILURE_MOMENT, FAILURE_STRAIN, FORCE, GRIP, GROUP, LOAD, LP, METHOD, MOMENT, POISSON, SCAN,
@@ -14,12 +15,12 @@ use crate::record::detail_columns;
 /// All files, in the order in which readers meet them.
 pub const FILES: [File; 18] = [
     File {
-        name: "answers.csv",
-        about: "one row a scan: its apparent modulus with all of its stated error, by the row of the least stated error",
+        name: own_files::ANSWERS,
+        about: "one row for each scan: its apparent modulus with its stated error, from the row with the smallest stated error",
         columns: &ANSWERS,
     },
     File {
-        name: "results.csv",
+        name: own_files::RESULTS,
         about: "one row a solve, and rows that follow from several solves (boundary ffb, extrapolated)",
         columns: &RESULTS,
     },
@@ -70,7 +71,7 @@ pub const FILES: [File; 18] = [
         columns: &methods::ANOVA,
     },
     File {
-        name: "failed.csv",
+        name: own_files::FAILED,
         about: "scans of a run that have no results",
         columns: &FAILED,
     },
@@ -105,7 +106,7 @@ const ANSWERS: [Column; 25] = [
     column(
         "method",
         "",
-        "floppy, firm, ffb, graded, voxel-fe, graded-extrapolated, voxel-fe-extrapolated",
+        "floppy, firm, ffb, graded (connected on sc, weighted on bcc and fcc), voxel-fe, geometry-fe, graded-extrapolated, voxel-fe-extrapolated",
     ),
     column(
         "element_mm",
@@ -137,7 +138,7 @@ const ANSWERS: [Column; 25] = [
     FAILURE_MOMENT,
 ];
 
-const RESULTS: [Column; 61] = [
+const RESULTS: [Column; 62] = [
     SCAN,
     METHOD,
     STRUCTURE,
@@ -172,7 +173,7 @@ const RESULTS: [Column; 61] = [
     column(
         "e_app_mpa",
         "MPa",
-        "the result: from the energy (floppy, graded, voxel-fe), from the stress of the fully coordinated sites (firm)",
+        "the result: from the energy (all but firm), from the stress of the fully coordinated sites (firm)",
     ),
     column(
         "e_app_reaction_mpa",
@@ -192,7 +193,7 @@ const RESULTS: [Column; 61] = [
     column(
         "discretization_error_mpa",
         "MPa",
-        "estimated error of the resolution; of ffb half the gap between floppy and firm, NA where they are shown to be no bracket",
+        "estimated error of the resolution; of ffb half the gap between floppy and firm, NA where the answer was found not to lie between them",
     ),
     column(
         "wall_s",
@@ -245,7 +246,7 @@ const RESULTS: [Column; 61] = [
     column(
         "shape_error_mpa",
         "MPa",
-        "what voxels and the scan's blur leave open about the bone's surface",
+        "uncertainty of the bone's surface, from voxels and the scan's blur",
     ),
     column(
         "error_mpa",
@@ -290,6 +291,11 @@ const RESULTS: [Column; 61] = [
         "max_stress_mpa",
         "MPa",
         "largest apparent stress of the curve, a magnitude",
+    ),
+    column(
+        "model_bv_tv",
+        "",
+        "volume of the model that carries load over TV: cells of sites (connected, weighted: their bone) or elements; bv_tv is the bone's",
     ),
 ];
 

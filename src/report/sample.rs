@@ -122,7 +122,7 @@ fn by_method(rows: &[&Row]) -> Vec<Sample> {
     let lattices = distinct(
         methods
             .iter()
-            .filter(|(_, s)| !matches!(s, CellType::Hex8 | CellType::Tet10))
+            .filter(|(_, s)| s.is_lattice())
             .map(|(_, s)| s),
     )
     .len();
@@ -133,12 +133,12 @@ fn by_method(rows: &[&Row]) -> Vec<Sample> {
             let of_scan = rows.iter().filter(own).filter(|row| row.key.scan == **scan);
             case(of_scan.min_by(|a, b| a.key.lp_mm.total_cmp(&b.key.lp_mm))?)
         };
-        let prefix = match lattices > 1 && !matches!(structure, CellType::Hex8 | CellType::Tet10) {
+        let prefix = match lattices > 1 && structure.is_lattice() {
             true => format!("{} ", structure.name().to_uppercase()),
             false => String::new(),
         };
         Sample {
-            method: format!("{prefix}{}", model.name()),
+            method: format!("{prefix}{}", model.name_on(*structure)),
             model: *model,
             structure: *structure,
             cases: scans.iter().filter_map(finest).collect(),
@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn a_scan_without_one_of_the_methods_is_left_out_of_that_one_only() {
         let mut rows = cohort(4);
-        rows.retain(|row| !(row.key.scan == "s2" && row.key.boundary == Some(BoundaryRule::FIRM)));
+        rows.retain(|row| !(row.key.scan == "s2" && row.key.boundary == Some(BoundaryRule::Firm)));
         let (samples, notes) = samples(&rows);
         assert_eq!(scans_of(&samples[0]), ["s1", "s2", "s3", "s4"]);
         assert_eq!(scans_of(&samples[1]), ["s1", "s3", "s4"]);

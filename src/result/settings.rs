@@ -36,6 +36,14 @@ pub enum CellType {
 }
 
 impl CellType {
+    pub fn is_lattice(self) -> bool {
+        matches!(self, CellType::Lattice(_))
+    }
+
+    pub fn is_simple_cubic(self) -> bool {
+        self == CellType::Lattice(Structure::Sc)
+    }
+
     pub fn name(self) -> &'static str {
         match self {
             CellType::Lattice(structure) => structure.name(),
@@ -66,10 +74,6 @@ pub enum BoundaryRule {
 }
 
 impl BoundaryRule {
-    pub const FIRM: BoundaryRule = BoundaryRule::Firm;
-    pub const FLOPPY: BoundaryRule = BoundaryRule::Floppy;
-    pub const GRADED: BoundaryRule = BoundaryRule::Graded;
-
     pub fn name(self) -> &'static str {
         match self {
             BoundaryRule::Firm => "firm",
@@ -164,9 +168,9 @@ words!(
 words!(
     BoundaryRule,
     [
-        BoundaryRule::FIRM,
-        BoundaryRule::FLOPPY,
-        BoundaryRule::GRADED,
+        BoundaryRule::Firm,
+        BoundaryRule::Floppy,
+        BoundaryRule::Graded,
         BoundaryRule::Ffb,
         BoundaryRule::Extrapolated
     ]

@@ -1,6 +1,7 @@
 //! Owns the columns of `results.csv`, in their order. Missing values are `None` here and `NA` in the file.
 
 use crate::grid::Axis;
+use crate::result::notes::NO_ANSWER;
 use crate::result::row::{FailureLoad, Marks, Row, Solution};
 use crate::result::settings::{
     BoundaryRule, CellType, Elements, Load, Method, Sed, Settings, Supports,
@@ -93,6 +94,8 @@ pub(super) struct Columns {
     yield_strain: Option<f64>,
     #[serde(default)]
     max_stress_mpa: Option<f64>,
+    #[serde(default)]
+    model_bv_tv: Option<f64>,
 }
 
 impl From<Row> for Columns {
@@ -162,6 +165,7 @@ impl From<Row> for Columns {
             yield_stress_mpa: solved.strength.yield_stress_mpa,
             yield_strain: solved.strength.yield_strain,
             max_stress_mpa: solved.strength.max_stress_mpa,
+            model_bv_tv: solved.model_bv_tv,
         }
     }
 }
@@ -201,6 +205,7 @@ impl TryFrom<Columns> for Row {
         };
         let solved = Solution {
             sites: c.sites,
+            model_bv_tv: c.model_bv_tv,
             dropped_sites: c.dropped_sites,
             unknowns: c.unknowns,
             iterations: c.iterations,
@@ -237,6 +242,11 @@ impl TryFrom<Columns> for Row {
             key,
             solved: (solved != Solution::default()).then_some(solved),
             marks: Marks {
+                // Files hold it as words.
+                is_no_answer: c
+                    .note
+                    .as_deref()
+                    .is_some_and(|note| note.contains(NO_ANSWER)),
                 note: c.note,
                 group: c.group,
                 subject: c.subject,

@@ -231,8 +231,9 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     }
     let (rows, met) = match args.error {
         Some(target) => {
-            needs_modulus(params.load, "error")?;
-            refuse_plasticity(&params)?;
+            if params.plasticity.is_none() {
+                needs_modulus(params.load, "error")?;
+            }
             let found =
                 bonepd_ct::command::adaptive::solve_to(&args.dir, target, &params, session)?;
             (found.rows, found.met)
@@ -275,17 +276,6 @@ fn export(
         )),
         "stl" => export_smooth(dir, Kind::Stl, params, bins, session),
         _ => export_smooth(dir, Kind::Vtu, params, bins, session),
-    }
-}
-
-fn refuse_plasticity(params: &SolveParams) -> Result<()> {
-    match params.plasticity {
-        None => Ok(()),
-        Some(_) => Err(Error::setting(
-            "--error",
-            "it states the error of the elastic modulus, and --plasticity asks for the strength",
-            "leave --error out, and compare with --refine-mask 2 and twice the --steps",
-        )),
     }
 }
 

@@ -28,7 +28,8 @@ pub struct SolveArgs {
     #[command(flatten)]
     lattice: LatticeSettings,
     /// Choose the resolution so that the stated error (solver, elements, shape) stays below this, as 3% or
-    /// 0.03; exit 1 where it cannot be met
+    /// 0.03; exit 1 where it cannot be met. With --plasticity the error of the strength (load steps, elements,
+    /// solver)
     #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "element_mm", "lp", "boundary", "structure"])]
     error: Option<f64>,
     /// Also write the model for another program: inp (voxel-fe, geometry-fe: CalculiX, Abaqus), stl (geometry-fe: the

@@ -114,8 +114,8 @@ mod tests {
         for (row, off) in [(&rows[0], 12.0), (&rows[2], 11.0)] {
             let found = stated(row, &rows).unwrap();
             let error = found.max_stress_error_mpa.unwrap();
-            // Changes are over the finer value, 1 to 12 % larger than the limit.
-            assert!(error > 0.98 * off && error < 1.02 * off, "{error} {off}");
+            // Changes are over the finer value, which is up to a twentieth smaller than that of the row.
+            assert!(error >= off && error < 1.05 * off, "{error} {off}");
             assert_eq!(found.yield_stress_error_mpa, None);
             assert_eq!(found.error(), Some(error / found.max_stress_mpa.unwrap()));
         }

@@ -69,10 +69,13 @@ fn frame(p: [usize; 3]) -> bool {
     p.iter().filter(|v| **v % 6 < 2).count() >= 2
 }
 
+/// Whether a voxel is bone.
+type Bone = fn([usize; 3]) -> bool;
+
 /// Elements of a quarter and steps of a quarter of those of the coarsest solve, where the stated one has at most a half.
 #[test]
 fn the_stated_error_of_a_strength_covers_a_much_finer_solve() {
-    let bodies: [(&str, [usize; 3], fn([usize; 3]) -> bool); 3] = [
+    let bodies: [(&str, [usize; 3], Bone); 3] = [
         ("frame", [8, 8, 8], frame),
         ("waves", [9, 9, 9], waves),
         ("strut", [9, 5, 10], strut),

@@ -40,6 +40,15 @@ pub struct Answer {
     pub moment_nmm: Option<f64>,
     #[serde(default)]
     pub failure_moment_nmm: Option<f64>,
+    /// Of tissue that yields.
+    #[serde(default)]
+    pub yield_stress_mpa: Option<f64>,
+    #[serde(default)]
+    pub yield_stress_error_mpa: Option<f64>,
+    #[serde(default)]
+    pub max_stress_mpa: Option<f64>,
+    #[serde(default)]
+    pub max_stress_error_mpa: Option<f64>,
     /// What a reader must know of the number.
     pub note: Option<String>,
     /// Of all rows of the condition together.
@@ -79,6 +88,10 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         angle_deg,
         moment_nmm,
         failure_moment_nmm,
+        yield_stress_mpa,
+        yield_stress_error_mpa,
+        max_stress_mpa,
+        max_stress_error_mpa,
         ..
     } = line(best(own().copied())?, facts);
     let wall_s = own()
@@ -109,6 +122,10 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         angle_deg,
         moment_nmm,
         failure_moment_nmm,
+        yield_stress_mpa,
+        yield_stress_error_mpa,
+        max_stress_mpa,
+        max_stress_error_mpa,
         note,
         wall_s: Some(wall_s.sum()),
     })

@@ -53,6 +53,8 @@ pub fn answers(rows: &[Row], facts: impl Fn(&str) -> ScanFacts) -> Answers {
     }
     let mut conditions = vec![condition.load_in_words(), condition.tissue_in_words()];
     conditions.extend(failure_in_words(&lines));
+    conditions.extend(laws_in_words(rows));
+    conditions.extend(strength_in_words(&lines));
     conditions.extend(methods_in_words(&lines));
     Answers {
         lines,
@@ -81,6 +83,34 @@ fn failure_in_words(lines: &[AnswerLine]) -> Option<String> {
     lines.iter().any(|line| line.failure_load_n.is_some()).then(|| {
         "Failure load: by Pistoia's criterion, the force at which a share of the bone (2 % unless set otherwise) exceeds an effective strain (0.007). It is proportional to the tissue modulus; no error of it is stated."
             .to_owned()
+    })
+}
+
+/// The laws by which tissue yields, as they were given.
+fn laws_in_words(rows: &[Row]) -> Option<String> {
+    let laws = distinct(rows.iter().filter_map(|row| row.key.plasticity.as_deref()));
+    (!laws.is_empty()).then(|| {
+        format!(
+            "Tissue that yields: {} (yield stresses, then hardening, in MPa).",
+            laws.join("; ")
+        )
+    })
+}
+
+/// What the stresses of tissue that yields are, where some does.
+fn strength_in_words(lines: &[AnswerLine]) -> Option<String> {
+    let yields = lines.iter().any(|line| line.max_stress_mpa.is_some());
+    let is_stated = lines.iter().any(|line| line.max_stress_error_mpa.is_some());
+    let error = match is_stated {
+        true => {
+            "the error asked for is theirs, and ± holds what finer load steps and finer elements would change and what the solver left, not what the image leaves open about the bone's surface"
+        }
+        false => "their error is not stated (--error asks for it)",
+    };
+    yields.then(|| {
+        format!(
+            "Yield stress: where the apparent stress-strain curve meets the elastic line shifted by 0.2 % strain; largest stress: of the curve, up to the strain applied. Both are magnitudes; {error}."
+        )
     })
 }
 
@@ -156,6 +186,7 @@ pub fn table(answers: &Answers) -> Table {
         "failure load (N)",
         "failure moment (N mm)",
         "yield stress (MPa)",
+        "largest stress (MPa)",
     ];
     let body = answers.lines.iter().map(|line| cells(line, answers));
     Table::new(&head, body.collect()).without_empty_columns()
@@ -187,7 +218,8 @@ fn cells(line: &AnswerLine, answers: &Answers) -> Vec<Cell> {
         number(line.moment_nmm),
         number(line.failure_load_n),
         number(line.failure_moment_nmm),
-        number(line.yield_stress_mpa),
+        with_error(line.yield_stress_mpa, line.yield_stress_error_mpa),
+        with_error(line.max_stress_mpa, line.max_stress_error_mpa),
     ]
 }
 

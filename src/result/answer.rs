@@ -38,6 +38,10 @@ pub struct AnswerLine {
     pub angle_deg: Option<f64>,
     pub moment_nmm: Option<f64>,
     pub failure_moment_nmm: Option<f64>,
+    /// Of tissue that yields.
+    pub yield_stress_error_mpa: Option<f64>,
+    pub max_stress_mpa: Option<f64>,
+    pub max_stress_error_mpa: Option<f64>,
 }
 
 /// What is known of a scan apart from its rows.
@@ -67,7 +71,7 @@ fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
     (
         row.carries_nothing(),
         row.converged() == Some(false),
-        row.error().unwrap_or(f64::INFINITY),
+        row.answered_error().unwrap_or(f64::INFINITY),
         exactness,
         row.key.lp_mm,
     )
@@ -128,6 +132,8 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
     // error is stated and no target met or missed.
     let is_disconnected = row.is_disconnected();
     let relative = row.error().filter(|_| !is_disconnected);
+    let answered = row.answered_error();
+    let strength = row.solved.as_ref().map(|s| s.strength).unwrap_or_default();
     AnswerLine {
         scan: key.scan.clone(),
         subject: row.marks.subject.clone(),
@@ -139,7 +145,7 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         met: facts
             .target
             .filter(|_| !is_disconnected)
-            .map(|target| relative.is_some_and(|e| e <= target)),
+            .map(|target| answered.is_some_and(|e| e <= target)),
         method: method_name(row),
         element_mm: key.lp_mm,
         young_mpa: key.young_mpa,
@@ -151,10 +157,7 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         stiffness_n_per_mm: forces.map(|[_, k]| k),
         force_n: forces.map(|[f, _]| f),
         failure_load_n: row.failure().and_then(|f| f.load_n),
-        yield_stress_mpa: row
-            .solved
-            .as_ref()
-            .and_then(|s| s.strength.yield_stress_mpa),
+        yield_stress_mpa: strength.yield_stress_mpa,
         threshold_sensitivity: row
             .solved
             .as_ref()
@@ -164,6 +167,9 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         angle_deg: key.angle_deg,
         moment_nmm: row.solved.as_ref().and_then(|s| s.moment_nmm),
         failure_moment_nmm: row.failure().and_then(|f| f.moment_nmm),
+        yield_stress_error_mpa: strength.yield_stress_error_mpa,
+        max_stress_mpa: strength.max_stress_mpa,
+        max_stress_error_mpa: strength.max_stress_error_mpa,
     }
 }
 

@@ -238,12 +238,6 @@ fn refuse_settings(tissue: &Tissue, params: &SolveParams) -> Result<()> {
             "give their size: --element-mm MM",
         ));
     }
-    if params.grip_mm > 0.0 && params.load.motion().is_some() {
-        return refused(
-            "grip_mm",
-            "geometry-fe holds end planes only: a gripped block came out 1.5 % too soft",
-        );
-    }
     if params.mechanisms {
         return refused("mechanisms", "geometry-fe counts no mechanisms");
     }

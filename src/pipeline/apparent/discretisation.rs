@@ -61,25 +61,8 @@ pub trait Discretisation: Sized {
         loads: LoadSet,
     ) -> System<'_, impl MixedPrecision, impl Precondition, impl Functional<3>>;
 
-    /// The sites at both ends and how they move.
-    fn ends(&self) -> EndSites<'_>;
-
     /// Apparent moduli of a solution under [`LoadSet::Ends`], where the ends come nearer or part.
     fn assess(&self, solved: &Equilibrated) -> Moduli;
-
-    /// The body at the end of its load steps, from the elastic solution `elastic` under the whole load; None where nothing can yield.
-    ///
-    /// # Errors
-    /// Settings that do not fit the specimen, steps that cannot be kept.
-    fn load_to_yield(
-        &self,
-        _prepared: Prepared,
-        _held: &Held,
-        _elastic: &Displacements,
-        _kept: &mut dyn Kept,
-    ) -> Result<Option<Yielded>> {
-        Ok(None)
-    }
 
     /// Fields and other numbers of the same solution, as far as the settings ask for them.
     ///
@@ -104,6 +87,11 @@ pub struct EndSites<'a> {
     pub planes_mm: [f64; 2],
     pub each: EachEndSite<'a>,
 }
+
+/// The body at the end of its load steps, from the elastic solution under the whole load. Fails on settings that do not fit the
+/// specimen and on steps that cannot be kept.
+pub type LoadSteps<'a> =
+    Box<dyn Fn(Prepared, &Held, &Displacements, &mut dyn Kept) -> Result<Yielded> + 'a>;
 
 /// Loads that share their supports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -135,6 +123,10 @@ pub struct System<'a, O, C, G> {
     pub held: Held,
     /// The start of a load (by number), which has the prescribed displacements: the field of a homogeneous body.
     pub start: Box<dyn Fn(usize) -> Displacements + 'a>,
+    /// The sites at both ends and how they move.
+    pub ends: EndSites<'a>,
+    /// How the body is loaded until it yields; None where nothing can yield.
+    pub load_steps: Option<LoadSteps<'a>>,
     /// Sites or elements that carry load; 0 where the supports are not connected.
     pub sites: usize,
     /// Those that exist but carry none.

@@ -149,16 +149,16 @@ impl<D: Discretisation> Solve for Of<D> {
             motion,
             planes_mm,
             each,
-        } = model.ends();
+        } = &system.ends;
         let moduli = match motion.motion {
             Motion::Along => model.assess(&elastic),
             _ => Moduli::NONE,
         };
         let mut work = motion.work(&moduli, &info);
         // A mechanism bears nothing that could yield.
-        let yielded = match info.ended {
-            Ended::EnergyTolerance | Ended::ResidualTolerance => {
-                model.load_to_yield(prepared, &system.held, &u, kept)?
+        let yielded = match (&system.load_steps, info.ended) {
+            (Some(load), Ended::EnergyTolerance | Ended::ResidualTolerance) => {
+                Some(load(prepared, &system.held, &u, kept)?)
             }
             _ => None,
         };
@@ -172,7 +172,7 @@ impl<D: Discretisation> Solve for Of<D> {
             },
         };
         let mut recorded = model.fields(prepared, params, &end, &work)?;
-        recorded.details.ends = reactions(&motion, planes_mm, end.force, each).to_vec();
+        recorded.details.ends = reactions(motion, *planes_mm, end.force, each).to_vec();
         let iterations = info.iterations + yielded.as_ref().map_or(0, |y| y.iterations);
         let yielding = yielded.map(|y| y.yielding);
         if let Some(y) = &yielding {

@@ -78,6 +78,15 @@ impl GeometryModel {
         let upper = self.grips.is_upper(at_mm);
         self.grips.is_gripped(at_mm).then_some(upper)
     }
+
+    fn ends(&self) -> EndSites<'_> {
+        let (mesh, grips) = (&self.model.mesh, &self.grips);
+        EndSites {
+            motion: self.motion,
+            planes_mm: [grips.low_mm, grips.high_mm],
+            each: Box::new(move |visit| supports::each_end_node(mesh, grips, visit)),
+        }
+    }
 }
 
 impl Discretisation for GeometryModel {
@@ -172,18 +181,11 @@ impl Discretisation for GeometryModel {
                 LoadSet::Ends => supports::start(mesh, &self.grips, &self.motion),
                 LoadSet::UnitStrains(_) => supports::affine(mesh, load),
             }),
+            ends: self.ends(),
+            load_steps: None,
             sites: mesh.elements.len(),
             dropped: self.report.loaded.dropped_elements,
             places: None,
-        }
-    }
-
-    fn ends(&self) -> EndSites<'_> {
-        let (mesh, grips) = (&self.model.mesh, &self.grips);
-        EndSites {
-            motion: self.motion,
-            planes_mm: [grips.low_mm, grips.high_mm],
-            each: Box::new(move |visit| supports::each_end_node(mesh, grips, visit)),
         }
     }
 

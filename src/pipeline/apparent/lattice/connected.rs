@@ -6,7 +6,7 @@ use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::connected::{ConnectedLattice, ConnectedSprings};
 use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::{
-    Cost, Discretisation, EndSites, Known, LoadSet, Prepared, System,
+    Cost, Discretisation, Known, LoadSet, Prepared, System,
 };
 use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded, SiteFields};
@@ -100,10 +100,6 @@ impl Discretisation for ConnectedModel {
             (&self.params, self.motion),
             None,
         )
-    }
-
-    fn ends(&self) -> EndSites<'_> {
-        self.placed().ends(self.motion)
     }
 
     fn assess(&self, solved: &Equilibrated) -> Moduli {

@@ -136,6 +136,8 @@ impl<'a> Placed<'a> {
             goal: goal.filter(|_| motion.motion == Motion::Along),
             held: self.held(params, &motion),
             start: Box::new(move |_| self.start(&motion)),
+            ends: self.ends(motion),
+            load_steps: None,
             sites: self.indices.len(),
             dropped: self.dropped,
             places,

@@ -7,7 +7,7 @@ use crate::physics::lattice::Lattice;
 use crate::physics::lattice::multigrid::Springs;
 use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::{
-    Cost, Discretisation, EndSites, Known, LoadSet, Places, Prepared, System,
+    Cost, Discretisation, Known, LoadSet, Places, Prepared, System,
 };
 use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded, SiteFields};
@@ -125,10 +125,6 @@ impl Discretisation for SiteModel {
             (params, self.motion),
             places,
         )
-    }
-
-    fn ends(&self) -> EndSites<'_> {
-        self.placed().ends(self.motion)
     }
 
     fn assess(&self, solved: &Equilibrated) -> Moduli {

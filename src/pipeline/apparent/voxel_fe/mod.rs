@@ -16,14 +16,11 @@ use crate::discretisation::voxels::Planes;
 use crate::error::Result;
 use crate::mask::resample;
 use crate::measure::apparent::EndWork;
-use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
 use crate::par::sum_chunks;
-use crate::pipeline::apparent::discretisation::Displacements;
 use crate::pipeline::apparent::discretisation::precondition::Precondition;
-use crate::pipeline::apparent::discretisation::yielded::{Kept, Yielded};
 use crate::pipeline::apparent::discretisation::{
-    Cost, Discretisation, EndSites, Known, LoadSet, Places, Prepared, System,
+    Cost, Discretisation, EndSites, Known, LoadSet, LoadSteps, Places, Prepared, System,
 };
 use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
@@ -71,6 +68,20 @@ impl VoxelModel {
             params: params.clone(),
             resolved: None,
         })
+    }
+
+    fn ends(&self) -> EndSites<'_> {
+        let (mesh, grips) = (self.bricks.mesh(), self.grips);
+        let h = mesh.grid.spacing_mm[grips.axis.index()];
+        EndSites {
+            motion: self.motion,
+            planes_mm: [grips.low, grips.high].map(|plane| plane as f64 * h),
+            each: Box::new(move |visit| supports::each_end_node(mesh, grips, visit)),
+        }
+    }
+
+    fn load_steps(&self) -> LoadSteps<'_> {
+        Box::new(|prepared, held, elastic, kept| self.yielded(prepared.tissue, held, elastic, kept))
     }
 }
 
@@ -144,22 +155,14 @@ impl Discretisation for VoxelModel {
                 LoadSet::Ends => supports::start(mesh, grips, motion),
                 LoadSet::UnitStrains(_) => supports::affine(mesh, load),
             }),
+            ends: self.ends(),
+            load_steps: self.params.plasticity.as_ref().map(|_| self.load_steps()),
             sites: mesh.elements,
             dropped: mesh.dropped,
             places: self.params.mechanisms.then(|| Places {
                 at: supports::grid_places(mesh),
                 reach: 1,
             }),
-        }
-    }
-
-    fn ends(&self) -> EndSites<'_> {
-        let (mesh, grips) = (self.bricks.mesh(), self.grips);
-        let h = mesh.grid.spacing_mm[grips.axis.index()];
-        EndSites {
-            motion: self.motion,
-            planes_mm: [grips.low, grips.high].map(|plane| plane as f64 * h),
-            each: Box::new(move |visit| supports::each_end_node(mesh, grips, visit)),
         }
     }
 
@@ -192,19 +195,6 @@ impl Discretisation for VoxelModel {
             from_reaction_mpa: loaded.from_reaction(reaction),
             from_stress_mpa: loaded.from_virial(virial),
             algebraic_error_mpa: info.energy_error / info.energy * from_energy_mpa,
-        }
-    }
-
-    fn load_to_yield(
-        &self,
-        prepared: Prepared,
-        held: &Held,
-        elastic: &Displacements,
-        kept: &mut dyn Kept,
-    ) -> Result<Option<Yielded>> {
-        match self.params.plasticity {
-            None => Ok(None),
-            Some(_) => self.yielded(prepared.tissue, held, elastic, kept).map(Some),
         }
     }
 

@@ -110,6 +110,8 @@ pub struct Recorded {
     pub surface: Option<SurfaceEnergy>,
     /// What a reader must know of the model.
     pub note: Option<String>,
+    /// Whether elements have another Euler number than the mask.
+    pub is_other_topology: bool,
     /// At the sites of a lattice.
     pub sites: Option<SiteFields>,
     pub details: Details,

@@ -81,6 +81,7 @@ impl<'a> Recorder<'a> {
                 .then(|| self.surface())
                 .flatten(),
             note: None,
+            is_other_topology: false,
             sites: None,
             details: Details {
                 failure: table,

@@ -83,6 +83,7 @@ impl<'a> Recorder<'a> {
             note: None,
             is_other_topology: false,
             sites: None,
+            mesh: None,
             details: Details {
                 failure: table,
                 ..self.statistics()

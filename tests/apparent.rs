@@ -196,8 +196,8 @@ fn the_real_stack_gives_the_reference_moduli() {
     ];
     for (lp, floppy_mpa, floppy_sites, firm_mpa, firm_sites) in reference {
         for (boundary, e_app, sites) in [
-            (BoundaryRule::FLOPPY, floppy_mpa, floppy_sites),
-            (BoundaryRule::FIRM, firm_mpa, firm_sites),
+            (BoundaryRule::Floppy, floppy_mpa, floppy_sites),
+            (BoundaryRule::Firm, firm_mpa, firm_sites),
         ] {
             let is_it = |r: &&bonepd_ct::result::row::Row| {
                 r.key.boundary == Some(boundary) && r.key.lp_mm == lp

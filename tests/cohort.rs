@@ -125,7 +125,7 @@ fn what_is_up_to_date_is_kept_and_what_changed_is_redone() {
     let floppy = |rows: &[Row]| -> Vec<Option<f64>> {
         let own = rows
             .iter()
-            .filter(|row| row.key.boundary == Some(BoundaryRule::FLOPPY));
+            .filter(|row| row.key.boundary == Some(BoundaryRule::Floppy));
         own.map(Row::e_app_mpa).collect()
     };
     assert_ne!(floppy(&third[6..]), floppy(&first[6..]));

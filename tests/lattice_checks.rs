@@ -62,7 +62,7 @@ fn firm_below_floppy_is_said_and_no_error_is_stated() {
     let dir = plate(10, 14);
     let stderr = solve(&dir, &["--lp", "0.06"]);
     let rows = rows(&dir);
-    let [floppy, firm, mean] = [BoundaryRule::FLOPPY, BoundaryRule::FIRM, BoundaryRule::Ffb]
+    let [floppy, firm, mean] = [BoundaryRule::Floppy, BoundaryRule::Firm, BoundaryRule::Ffb]
         .map(|boundary| of(&rows, boundary));
     assert!(firm.e_app_mpa() < floppy.e_app_mpa(), "{firm:?} {floppy:?}");
     assert!(mean.e_app_mpa().is_some() && mean.error_mpa().is_none());
@@ -122,7 +122,7 @@ fn a_lattice_that_falls_apart_is_no_missing_path_of_bone() {
     let dir = segmented([24; 3], rods);
     solve(&dir, &["--lp", "0.1"]);
     let found = rows(&dir);
-    let [floppy, firm, mean] = [BoundaryRule::FLOPPY, BoundaryRule::FIRM, BoundaryRule::Ffb]
+    let [floppy, firm, mean] = [BoundaryRule::Floppy, BoundaryRule::Firm, BoundaryRule::Ffb]
         .map(|boundary| of(&found, boundary));
     assert_eq!(floppy.e_app_mpa(), Some(0.0));
     assert!(
@@ -141,7 +141,7 @@ fn a_lattice_that_falls_apart_is_no_missing_path_of_bone() {
     let gap = segmented([24; 3], |[.., z]| !(5..19).contains(&z));
     solve(&gap, &["--lp", "0.1"]);
     let found = rows(&gap);
-    assert!(note(of(&found, BoundaryRule::FLOPPY)).contains("no path of bone"));
+    assert!(note(of(&found, BoundaryRule::Floppy)).contains("no path of bone"));
     assert_eq!(of(&found, BoundaryRule::Ffb).e_app_mpa(), Some(0.0));
 }
 
@@ -165,7 +165,7 @@ fn firm_without_a_site_of_all_bonds_gives_no_mean() {
     let dir = plate(11, 13);
     solve(&dir, &["--lp", "0.04"]);
     let found = rows(&dir);
-    let [floppy, firm, mean] = [BoundaryRule::FLOPPY, BoundaryRule::FIRM, BoundaryRule::Ffb]
+    let [floppy, firm, mean] = [BoundaryRule::Floppy, BoundaryRule::Firm, BoundaryRule::Ffb]
         .map(|boundary| of(&found, boundary));
     assert!(floppy.e_app_mpa() > Some(0.0));
     assert_eq!((firm.e_app_mpa(), firm.error_mpa()), (Some(0.0), None));

@@ -10,6 +10,7 @@ mod limits;
 mod refusals;
 mod repeated_modes;
 mod resume;
+mod tetrachiral;
 mod thermal_stress;
 mod turned;
 

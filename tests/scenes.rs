@@ -68,7 +68,7 @@ fn every_molecular_scene_file_passes_a_dry_run() {
     assert!(count > 15, "{count} scenes");
 }
 
-/// The local twin of the unit square: spec A3, and all files a scene leaves.
+/// The local twin of the unit square, and all files a scene leaves.
 #[test]
 fn the_program_runs_a_scene() {
     let dir = tempfile::tempdir().unwrap();

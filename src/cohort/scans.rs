@@ -107,7 +107,7 @@ pub fn refuse_many(input: &Path) -> Result<()> {
 }
 
 /// Files that a command of this program leaves in a folder of results.
-const RESULTS: [&str; 3] = [specimen::RECORD, "results.csv", "report.html"];
+const RESULTS: [&str; 3] = [own_files::RECORD, own_files::RESULTS, "report.html"];
 
 /// Whether a folder holds results of this program.
 fn holds_results(folder: &Path) -> bool {
@@ -155,7 +155,10 @@ fn scans_under(
         });
     }
     if found.is_empty() {
-        if input.join("segment.json").is_file() || input.join("answers.csv").is_file() {
+        if [own_files::RECORD, own_files::ANSWERS]
+            .iter()
+            .any(|name| input.join(name).is_file())
+        {
             return Err(Error::file(
                 input,
                 "is a folder of results, where scans were expected",
@@ -255,11 +258,11 @@ fn descend(
 fn refuse_names(jobs: &[ScanJob]) -> Result<()> {
     const OWN: [&str; 6] = [
         "report",
-        "results.csv",
-        "answers.csv",
-        "recipe.toml",
-        "recipe.old.toml",
-        "failed.csv",
+        own_files::RESULTS,
+        own_files::ANSWERS,
+        own_files::RECIPE,
+        own_files::OLD_RECIPE,
+        own_files::FAILED,
     ];
     let path_like = |name: &str| name.contains(['/', '\\', '\0']) || [".", ".."].contains(&name);
     for job in jobs {

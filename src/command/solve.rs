@@ -339,7 +339,7 @@ impl OpenScan {
             return;
         };
         let whole = |key: &&Settings| {
-            [Some(BoundaryRule::FIRM), Some(BoundaryRule::FLOPPY)].contains(&key.boundary)
+            [Some(BoundaryRule::Firm), Some(BoundaryRule::Floppy)].contains(&key.boundary)
         };
         let coarse = |key: &&Settings| key.lp_mm > 0.5 * thickness;
         let keys = blanks.map(|row| &row.key).filter(whole).filter(coarse);

@@ -3,6 +3,7 @@
 mod groups;
 mod methods;
 
+use crate::io::own_files;
 use crate::record::column::{
     ANGLE, AXIS, BOUNDARY, BV_TV, ENDS, FAILURE_DISPLACEMENT, FAILURE_FACTOR, FAILURE_LOAD,
     FAILURE_MOMENT, FAILURE_STRAIN, FORCE, GRIP, GROUP, LOAD, LP, METHOD, MOMENT, POISSON, SCAN,
@@ -14,12 +15,12 @@ use crate::record::detail_columns;
 /// All files, in the order in which readers meet them.
 pub const FILES: [File; 18] = [
     File {
-        name: "answers.csv",
+        name: own_files::ANSWERS,
         about: "one row a scan: its apparent modulus with all of its stated error, by the row of the least stated error",
         columns: &ANSWERS,
     },
     File {
-        name: "results.csv",
+        name: own_files::RESULTS,
         about: "one row a solve, and rows that follow from several solves (boundary ffb, extrapolated)",
         columns: &RESULTS,
     },
@@ -70,7 +71,7 @@ pub const FILES: [File; 18] = [
         columns: &methods::ANOVA,
     },
     File {
-        name: "failed.csv",
+        name: own_files::FAILED,
         about: "scans of a run that have no results",
         columns: &FAILED,
     },
@@ -137,7 +138,7 @@ const ANSWERS: [Column; 25] = [
     FAILURE_MOMENT,
 ];
 
-const RESULTS: [Column; 61] = [
+const RESULTS: [Column; 62] = [
     SCAN,
     METHOD,
     STRUCTURE,
@@ -290,6 +291,11 @@ const RESULTS: [Column; 61] = [
         "max_stress_mpa",
         "MPa",
         "largest apparent stress of the curve, a magnitude",
+    ),
+    column(
+        "model_bv_tv",
+        "",
+        "volume of the model that carries load over TV: cells of sites (connected, weighted: their bone) or elements; bv_tv is the bone's",
     ),
 ];
 

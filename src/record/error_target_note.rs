@@ -58,7 +58,7 @@ fn is_same_solve(a: &Settings, b: &Settings) -> bool {
     let stated = |key: &Settings| {
         matches!(
             key.boundary,
-            None | Some(BoundaryRule::GRADED | BoundaryRule::Extrapolated)
+            None | Some(BoundaryRule::Graded | BoundaryRule::Extrapolated)
         )
     };
     stated(a) && stated(b) && settings(a) == settings(b)
@@ -97,7 +97,7 @@ mod tests {
         assert_eq!(noted(row(None, 0.02, None)).as_deref(), Some(words));
         assert_eq!(noted(limit.clone()), Some(format!("limit of two; {words}")));
         assert_eq!(noted(row(None, 0.04, None)), None);
-        assert_eq!(noted(row(Some(BoundaryRule::FIRM), 0.02, None)), None);
+        assert_eq!(noted(row(Some(BoundaryRule::Firm), 0.02, None)), None);
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! Owns `failed.csv`: the scans of a run that have no results, and why.
 
 use crate::error::Result;
+use crate::io::own_files::FAILED;
 use crate::io::table;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Scans of a run that have no results, in its output folder; absent where there are none.
-const FAILED: &str = "failed.csv";
 
 /// A scan of a run that has no results: a line of `failed.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]

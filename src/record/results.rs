@@ -3,7 +3,7 @@
 //! redone.
 
 use crate::error::{Error, Result};
-use crate::io::{atomic, table};
+use crate::io::{atomic, own_files, table};
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::pipeline::apparent::SolveParams;
@@ -18,7 +18,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The rows of a scan, or of a run, for other programs.
-pub const TABLE: &str = "results.csv";
+pub const TABLE: &str = own_files::RESULTS;
 
 /// The same with provenance.
 const RECORD: &str = "results.json";
@@ -317,8 +317,8 @@ mod tests {
     use crate::result::row::Solution;
     use crate::result::settings::BoundaryRule;
 
-    const FIRM: BoundaryRule = BoundaryRule::FIRM;
-    const FLOPPY: BoundaryRule = BoundaryRule::FLOPPY;
+    const FIRM: BoundaryRule = BoundaryRule::Firm;
+    const FLOPPY: BoundaryRule = BoundaryRule::Floppy;
 
     fn blank(boundary: BoundaryRule) -> Row {
         Row {

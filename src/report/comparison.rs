@@ -3,8 +3,10 @@
 use super::figure::{Axis, Content, Curve, Figure, GroupOfPoints, Mark, Point};
 use super::sample::Sample;
 use super::statistics::{Comparison, against_reference};
-use crate::result::statistics::agreement::agreement;
+use crate::report::cells::{digits, p_value};
+use crate::result::statistics::agreement::{agreement, percent_differences};
 use crate::result::statistics::quartiles::quartiles;
+use crate::result::statistics::regression::regression;
 
 /// Empty for fewer than three scans.
 pub fn figures(samples: &[Sample]) -> Vec<Figure> {
@@ -14,7 +16,12 @@ pub fn figures(samples: &[Sample]) -> Vec<Figure> {
     let pairs = against_reference(samples);
     let mut figures = vec![methods(samples)];
     figures.extend(identity(&pairs));
-    figures.extend(pairs.iter().map(bland_altman));
+    figures.extend(identity_over_bv_tv(&pairs));
+    figures.extend(differences(&pairs));
+    figures.extend(differences_over_bv_tv(&pairs));
+    for pair in &pairs {
+        figures.extend([bland_altman(pair), bland_altman_percent(pair)]);
+    }
     figures
 }
 
@@ -40,34 +47,12 @@ fn methods(samples: &[Sample]) -> Figure {
 /// Moduli of all methods over those of the reference. None without comparisons.
 fn identity(pairs: &[Comparison]) -> Option<Figure> {
     let reference = &pairs.first()?.reference.method;
-    let all = pairs.iter().flat_map(|c| &c.reference_mpa);
-    let most = all.copied().fold(0.0, f64::max);
-    let points = |c: &Comparison| {
-        let both = c.reference_mpa.iter().zip(&c.method_mpa);
-        both.map(|(x, y)| Point::new(*x, *y)).collect()
-    };
-    let mut curves: Vec<Curve> = pairs
-        .iter()
-        .map(|c| Curve {
-            name: c.sample.method.clone(),
-            hue: c.sample.model as usize,
-            shape: c.sample.model as usize,
-            mark: Mark::Points,
-            points: points(c),
-        })
-        .collect();
-    curves.push(Curve {
-        name: "equal".to_owned(),
-        hue: 2,
-        shape: 0,
-        mark: Mark::Rule,
-        points: vec![Point::new(0.0, 0.0), Point::new(most, most)],
-    });
+    let curves = against_equal(pairs, |c| [c.reference_mpa.clone(), c.method_mpa.clone()]);
     Some(Figure {
         stem: "agreement".to_owned(),
         folded: true,
         title: format!("Methods against {reference}"),
-        caption: "One point per scan that has both; on the dashed line methods agree.".to_owned(),
+        caption: "One point per scan that has both, with lines of least squares; on the dashed black line methods agree.".to_owned(),
         x: Axis::linear(&format!("apparent modulus, {reference} (MPa)")),
         y: Axis::linear("apparent modulus (MPa)"),
         content: Content::Curves(curves),
@@ -75,53 +60,216 @@ fn identity(pairs: &[Comparison]) -> Option<Figure> {
     })
 }
 
+/// The same of moduli over BV/TV: what the amount of bone explains is out.
+fn identity_over_bv_tv(pairs: &[Comparison]) -> Option<Figure> {
+    let reference = &pairs.first()?.reference.method;
+    let curves = against_equal(pairs, |c| {
+        let [method, reference] = c.over_bv_tv();
+        [reference, method]
+    });
+    Some(Figure {
+        stem: "agreement-over-bv-tv".to_owned(),
+        folded: true,
+        title: format!("Methods against {reference}, over BV/TV"),
+        caption: "Modulus over BV/TV, one point per scan that has both, with lines of least squares; on the dashed black line methods agree."
+            .to_owned(),
+        x: Axis::linear(&format!("E_app / (BV/TV), {reference} (MPa)")),
+        y: Axis::linear("E_app / (BV/TV) (MPa)"),
+        content: Content::Curves(curves),
+        ..Figure::default()
+    })
+}
+
+/// Points and lines of fit of all comparisons, `values` over x and y, and the line on which methods agree.
+fn against_equal(
+    pairs: &[Comparison],
+    values: impl Fn(&Comparison) -> [Vec<f64>; 2],
+) -> Vec<Curve> {
+    let places: Vec<[Vec<f64>; 2]> = pairs.iter().map(values).collect();
+    let most = places
+        .iter()
+        .flat_map(|[x, _]| x)
+        .copied()
+        .fold(0.0, f64::max);
+    let both = pairs.iter().zip(&places);
+    let mut curves: Vec<Curve> = both.clone().map(|(c, at)| points(c, at)).collect();
+    curves.extend(both.filter_map(|(c, at)| fitted(c, at)));
+    curves.push(Curve {
+        name: "equal".to_owned(),
+        hue: 2,
+        shape: 0,
+        mark: Mark::Rule,
+        points: vec![Point::new(0.0, 0.0), Point::new(most, most)],
+    });
+    curves
+}
+
+fn points(c: &Comparison, [x, y]: &[Vec<f64>; 2]) -> Curve {
+    Curve {
+        name: c.sample.method.clone(),
+        hue: c.sample.model as usize,
+        shape: c.sample.model as usize,
+        mark: Mark::Points,
+        points: x.iter().zip(y).map(|(x, y)| Point::new(*x, *y)).collect(),
+    }
+}
+
+/// The line of least squares in the colour of its points, without a name of its own.
+fn fitted(c: &Comparison, [x, y]: &[Vec<f64>; 2]) -> Option<Curve> {
+    let line = regression(x, y)?;
+    let (low, high) = span(x);
+    let at = |x: f64| Point::new(x, line.intercept + line.slope * x);
+    Some(Curve {
+        name: String::new(),
+        hue: c.sample.model as usize,
+        shape: 0,
+        mark: Mark::Rule,
+        points: vec![at(low), at(high)],
+    })
+}
+
+fn span(values: &[f64]) -> (f64, f64) {
+    let ends = (f64::INFINITY, f64::NEG_INFINITY);
+    values
+        .iter()
+        .fold(ends, |(low, high), v| (low.min(*v), high.max(*v)))
+}
+
+/// Differences from the reference in percent, side by side.
+fn differences(pairs: &[Comparison]) -> Option<Figure> {
+    let first = pairs.first()?;
+    let group = |c: &Comparison| GroupOfPoints {
+        label: format!("{} (n = {})", c.sample.method, c.method_mpa.len()),
+        hue: c.sample.model as usize,
+        values: c.differences_percent(),
+        mean: None,
+        median: quartiles(&c.differences_percent()).map(|q| q.median),
+    };
+    Some(Figure {
+        stem: "differences".to_owned(),
+        folded: true,
+        title: format!("Differences from {}", first.reference.method),
+        caption: "Points: scans, method less reference over the reference; line: median."
+            .to_owned(),
+        y: Axis::linear(&first.difference_from()),
+        content: Content::Groups(pairs.iter().map(group).collect()),
+        ..Figure::default()
+    })
+}
+
+/// The same over BV/TV: whether a method is off by more where there is less bone.
+fn differences_over_bv_tv(pairs: &[Comparison]) -> Option<Figure> {
+    let first = pairs.first()?;
+    let places = |c: &Comparison| [c.bv_tv.clone(), c.differences_percent()];
+    let mut curves: Vec<Curve> = pairs.iter().map(|c| points(c, &places(c))).collect();
+    curves.extend(pairs.iter().filter_map(|c| fitted(c, &places(c))));
+    Some(Figure {
+        stem: "differences-over-bv-tv".to_owned(),
+        folded: true,
+        title: format!("Differences from {} over BV/TV", first.reference.method),
+        caption: "One point per scan that has both, with lines of least squares; their slopes and p are in the table of regressions."
+            .to_owned(),
+        x: Axis::linear("BV/TV"),
+        y: Axis::linear(&first.difference_from()),
+        content: Content::Curves(curves),
+        ..Figure::default()
+    })
+}
+
+/// Bland and Altman's plot of the differences in MPa.
 fn bland_altman(c: &Comparison) -> Figure {
     let both = c.method_mpa.iter().zip(&c.reference_mpa);
-    let points: Vec<Point> = both
-        .map(|(a, b)| Point::new(0.5 * (a + b), a - b))
-        .collect();
-    let ends = points
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
-            (lo.min(p.x), hi.max(p.x))
-        });
+    let differences: Vec<f64> = both.map(|(a, b)| a - b).collect();
+    let levels = agreement(&c.method_mpa, &c.reference_mpa);
+    let (method, reference) = (&c.sample.method, &c.reference.method);
+    Figure {
+        stem: format!("bland-altman-{}", file_words(method)),
+        title: format!("{method} against {reference}"),
+        caption: format!(
+            "{method} less {reference} over the mean of both (Bland and Altman), {} scans, with the mean difference and its limits of agreement.",
+            differences.len()
+        ),
+        y: Axis::linear("difference (MPa)"),
+        ..over_means(
+            c,
+            &differences,
+            levels.map(|a| [a.bias, a.lower_limit, a.upper_limit]),
+        )
+    }
+}
+
+/// The same with differences in percent of the mean of both, and their line of least squares.
+fn bland_altman_percent(c: &Comparison) -> Figure {
+    let differences = percent_differences(&c.method_mpa, &c.reference_mpa);
+    let levels = agreement(&c.method_mpa, &c.reference_mpa);
+    let slope = levels.and_then(|a| Some((a.slope_percent_per_mpa?, a.slope_p?)));
+    let tested = match slope {
+        Some((slope, p)) => format!(
+            " Their slope is {} % per MPa (p {}).",
+            digits(Some(slope)),
+            p_value(Some(p)).text
+        ),
+        None => String::new(),
+    };
+    let (method, reference) = (&c.sample.method, &c.reference.method);
+    let limits = levels.map(|a| [a.bias_percent, a.lower_limit_percent, a.upper_limit_percent]);
+    let mut figure = Figure {
+        stem: format!("bland-altman-percent-{}", file_words(method)),
+        title: format!("{method} against {reference}, in percent"),
+        caption: format!(
+            "{method} less {reference} in percent of the mean of both, {} scans, with the mean difference and its limits of agreement.{tested}",
+            differences.len()
+        ),
+        y: Axis::linear("difference (% of the mean)"),
+        ..over_means(c, &differences, limits)
+    };
+    if let Content::Curves(curves) = &mut figure.content {
+        curves.extend(fitted(c, &[means(c), differences]));
+    }
+    figure
+}
+
+fn means(c: &Comparison) -> Vec<f64> {
+    let both = c.method_mpa.iter().zip(&c.reference_mpa);
+    both.map(|(a, b)| 0.5 * (a + b)).collect()
+}
+
+/// Differences over the means of both, with their mean and limits of agreement as levels.
+fn over_means(c: &Comparison, differences: &[f64], levels: Option<[f64; 3]>) -> Figure {
+    let means = means(c);
+    let (low, high) = span(&means);
     let level = |name: &str, hue, y| Curve {
         name: name.to_owned(),
         hue,
         shape: 0,
         mark: Mark::Rule,
-        points: vec![Point::new(ends.0, y), Point::new(ends.1, y)],
+        points: vec![Point::new(low, y), Point::new(high, y)],
     };
     let mut curves = Vec::new();
-    if let Some(found) = agreement(&c.method_mpa, &c.reference_mpa) {
-        curves.push(level("mean + 1.96 SD", 1, found.upper_limit));
-        curves.push(level("mean", 2, found.bias));
-        curves.push(level("mean − 1.96 SD", 1, found.lower_limit));
+    if let Some([mean, lower, upper]) = levels {
+        curves.push(level("mean + 1.96 SD", 1, upper));
+        curves.push(level("mean", 2, mean));
+        curves.push(level("mean − 1.96 SD", 1, lower));
     }
-    let n = points.len();
+    let places = means.iter().zip(differences);
     curves.push(Curve {
         name: "scans".to_owned(),
         hue: 0,
         shape: 0,
         mark: Mark::Points,
-        points,
+        points: places.map(|(x, y)| Point::new(*x, *y)).collect(),
     });
-    let (method, reference) = (&c.sample.method, &c.reference.method);
     Figure {
-        stem: format!(
-            "bland-altman-{}",
-            method.to_lowercase().replace(", ", "-").replace(' ', "-")
-        ),
         folded: true,
-        title: format!("{method} against {reference}"),
-        caption: format!(
-            "{method} less {reference} over the mean of both (Bland and Altman), {n} scans, with the mean difference and its limits of agreement."
-        ),
         x: Axis::linear("mean of both (MPa)"),
-        y: Axis::linear("difference (MPa)"),
         content: Content::Curves(curves),
         ..Figure::default()
     }
+}
+
+/// A method's name in the name of a file.
+fn file_words(method: &str) -> String {
+    method.to_lowercase().replace(", ", "-").replace(' ', "-")
 }
 
 #[cfg(test)]
@@ -157,10 +305,17 @@ mod tests {
         let expected = [
             "methods",
             "agreement",
+            "agreement-over-bv-tv",
+            "differences",
+            "differences-over-bv-tv",
             "bland-altman-floppy",
+            "bland-altman-percent-floppy",
             "bland-altman-firm",
+            "bland-altman-percent-firm",
             "bland-altman-ffb-mean",
+            "bland-altman-percent-ffb-mean",
             "bland-altman-graded-extrapolated",
+            "bland-altman-percent-graded-extrapolated",
         ];
         assert_eq!(stems(&figures), expected);
         let Content::Groups(groups) = &figures[0].content else {

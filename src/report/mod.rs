@@ -197,10 +197,11 @@ pub enum Model {
     GradedLimit,
     /// Limit of voxel FE.
     VoxelFeLimit,
+    GeometryFe,
 }
 
 impl Model {
-    pub const ALL: [Model; 7] = [
+    pub const ALL: [Model; 8] = [
         Model::Floppy,
         Model::Firm,
         Model::Ffb,
@@ -208,6 +209,7 @@ impl Model {
         Model::VoxelFe,
         Model::GradedLimit,
         Model::VoxelFeLimit,
+        Model::GeometryFe,
     ];
 
     /// None for a method without a column, and for elements of a smoother image, which answer nothing: their rows stand in the
@@ -224,6 +226,7 @@ impl Model {
             (Some(BoundaryRule::Extrapolated), Method::VoxelFe) => Model::VoxelFeLimit,
             (Some(BoundaryRule::Extrapolated), _) => Model::GradedLimit,
             (None, Method::VoxelFe) => Model::VoxelFe,
+            (None, Method::GeometryFe) => Model::GeometryFe,
             (None, _) => return None,
         })
     }
@@ -242,6 +245,7 @@ impl Model {
             "voxel FE",
             "graded, extrapolated",
             "voxel FE, extrapolated",
+            "geometry-based FE",
         ][self as usize]
     }
 }
@@ -292,10 +296,10 @@ mod tests {
     #[test]
     fn a_line_holds_all_boundaries_of_one_lattice_parameter() {
         let rows = [
-            row("a", BoundaryRule::FLOPPY, 0.1, 30.0),
-            row("a", BoundaryRule::FIRM, 0.1, 90.0),
+            row("a", BoundaryRule::Floppy, 0.1, 30.0),
+            row("a", BoundaryRule::Firm, 0.1, 90.0),
             row("a", BoundaryRule::Ffb, 0.1, 60.0),
-            row("a", BoundaryRule::FLOPPY, 0.2, 20.0),
+            row("a", BoundaryRule::Floppy, 0.2, 20.0),
         ];
         let report = report_of(&rows);
         assert_eq!(report.lines.len(), 2);
@@ -315,16 +319,16 @@ mod tests {
 
     #[test]
     fn settings_that_differ_are_told_apart() {
-        let mut sideways = row("a", BoundaryRule::FLOPPY, 0.1, 12.0);
+        let mut sideways = row("a", BoundaryRule::Floppy, 0.1, 12.0);
         sideways.key.axis = Axis::X;
-        let lines = table::lines(&[row("a", BoundaryRule::FLOPPY, 0.1, 30.0), sideways]);
+        let lines = table::lines(&[row("a", BoundaryRule::Floppy, 0.1, 30.0), sideways]);
         assert_eq!(lines.len(), 2);
         assert_eq!(lines[1].condition.as_deref(), Some("axis x"));
     }
 
     #[test]
     fn a_row_that_is_not_converged_is_noted() {
-        let mut stalled = row("a", BoundaryRule::FLOPPY, 0.1, 30.0);
+        let mut stalled = row("a", BoundaryRule::Floppy, 0.1, 30.0);
         stalled.solved.as_mut().unwrap().converged = Some(false);
         let report = report_of(&[stalled]);
         assert_eq!(report.notes, ["a: not converged"]);
@@ -335,7 +339,7 @@ mod tests {
     fn a_warning_of_many_scans_is_one_line() {
         let rows: Vec<Row> = ["a", "b"]
             .iter()
-            .flat_map(|scan| [0.1, 0.2].map(|lp| row(scan, BoundaryRule::FLOPPY, lp, 30.0)))
+            .flat_map(|scan| [0.1, 0.2].map(|lp| row(scan, BoundaryRule::Floppy, lp, 30.0)))
             .map(|mut row| {
                 row.marks.mean_thickness_mm = Some(0.05 * (1.0 + row.key.lp_mm));
                 crate::result::cautions::mark(&mut row, 5.0);
@@ -357,7 +361,7 @@ mod tests {
     #[test]
     fn scans_of_like_names_have_figures_of_their_own() {
         let names = ["scan 1", "scan_1", "SCAN_1", "scan_1-2"];
-        let rows = names.map(|name| row(name, BoundaryRule::FLOPPY, 0.1, 30.0));
+        let rows = names.map(|name| row(name, BoundaryRule::Floppy, 0.1, 30.0));
         let report = report_of(&rows);
         let mut stems: Vec<String> = report
             .figures
@@ -376,14 +380,14 @@ mod tests {
             let report = report_of(rows);
             report.figures.into_iter().map(|f| f.stem).collect()
         };
-        let mut fine = row("a", BoundaryRule::FLOPPY, 0.02, 50.0);
+        let mut fine = row("a", BoundaryRule::Floppy, 0.02, 50.0);
         fine.key = Settings {
             method: Method::VoxelFe,
             structure: CellType::Hex8,
             boundary: None,
             ..fine.key
         };
-        let coarse = row("a", BoundaryRule::FLOPPY, 0.1, 30.0);
+        let coarse = row("a", BoundaryRule::Floppy, 0.1, 30.0);
         assert_eq!(stems(&[]), Vec::<String>::new());
         // One size shows no convergence.
         assert_eq!(stems(std::slice::from_ref(&coarse)), Vec::<String>::new());
@@ -391,7 +395,7 @@ mod tests {
             stems(&[
                 coarse.clone(),
                 fine,
-                row("b", BoundaryRule::FLOPPY, 0.1, 10.0)
+                row("b", BoundaryRule::Floppy, 0.1, 10.0)
             ]),
             ["bv-tv", "answers", "convergence-a", "speed-error"]
         );

@@ -14,12 +14,12 @@ use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::render::{Primitive, Scene, render_multiple};
 
-/// Okabe and Ito's palette without its yellow, which is too pale on paper.
-const HUES: [&str; 7] = [
-    "#0072B2", "#D55E00", "#000000", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
+/// Okabe and Ito's palette with a brown for its yellow, which is too pale on paper.
+const HUES: [&str; 8] = [
+    "#0072B2", "#D55E00", "#000000", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B",
 ];
 
-const MARKERS: [MarkerShape; 7] = [
+const MARKERS: [MarkerShape; 8] = [
     MarkerShape::Circle,
     MarkerShape::Square,
     MarkerShape::Diamond,
@@ -27,6 +27,7 @@ const MARKERS: [MarkerShape; 7] = [
     MarkerShape::TriangleDown,
     MarkerShape::Pentagon,
     MarkerShape::Star,
+    MarkerShape::Cross,
 ];
 
 /// Markers of groups: without the diamond, which is their mean.

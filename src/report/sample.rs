@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn a_scan_without_one_of_the_methods_is_left_out_of_that_one_only() {
         let mut rows = cohort(4);
-        rows.retain(|row| !(row.key.scan == "s2" && row.key.boundary == Some(BoundaryRule::FIRM)));
+        rows.retain(|row| !(row.key.scan == "s2" && row.key.boundary == Some(BoundaryRule::Firm)));
         let (samples, notes) = samples(&rows);
         assert_eq!(scans_of(&samples[0]), ["s1", "s2", "s3", "s4"]);
         assert_eq!(scans_of(&samples[1]), ["s1", "s3", "s4"]);

@@ -1,7 +1,7 @@
 //! Owns the report's statistics over scans: which methods are held against which, and the tables of it.
 
 use super::cells::p_value;
-use super::sample::{LEAST_SCANS, Sample};
+use super::sample::{Case, LEAST_SCANS, Sample};
 use super::{Model, distinct};
 use crate::result::statistics::agreement::{Agreement, agreement};
 use crate::result::statistics::anova::{Anova, repeated_measures};
@@ -30,7 +30,7 @@ pub struct AgreementLine {
 /// One line of a table of distributions.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct BoxLine {
-    /// `E_app (MPa)` or `E_app / (BV/TV) (MPa)`.
+    /// `E_app (MPa)`, `E_app / (BV/TV) (MPa)` or `difference from REFERENCE (%)`.
     pub quantity: String,
     pub method: String,
     /// None: all scans.
@@ -81,6 +81,26 @@ pub(super) struct Comparison<'a> {
     pub reference: &'a Sample,
     pub method_mpa: Vec<f64>,
     pub reference_mpa: Vec<f64>,
+    pub bv_tv: Vec<f64>,
+}
+
+impl Comparison<'_> {
+    /// Method less reference over the reference, in percent.
+    pub fn differences_percent(&self) -> Vec<f64> {
+        let both = self.method_mpa.iter().zip(&self.reference_mpa);
+        both.map(|(m, r)| 100.0 * (m / r - 1.0)).collect()
+    }
+
+    /// E_app over BV/TV, of the method and of the reference.
+    pub fn over_bv_tv(&self) -> [Vec<f64>; 2] {
+        [&self.method_mpa, &self.reference_mpa]
+            .map(|moduli| moduli.iter().zip(&self.bv_tv).map(|(e, f)| e / f).collect())
+    }
+
+    /// What its differences are called.
+    pub fn difference_from(&self) -> String {
+        format!("difference from {} (%)", self.reference.method)
+    }
 }
 
 /// The samples of more than half as many scans as the largest has: a method tried on a few scans does not decide for all.
@@ -116,14 +136,17 @@ pub(super) fn against_reference(samples: &[Sample]) -> Vec<Comparison<'_>> {
     let against = |sample| {
         let shared = reference.cases.iter().filter_map(|r| {
             let s = Sample::of(sample, &r.scan)?;
-            Some((s.e_app_mpa, r.e_app_mpa))
+            // A percentage of nothing says nothing.
+            (r.e_app_mpa > 0.0).then_some((s, r))
         });
-        let (method_mpa, reference_mpa) = shared.unzip();
+        let shared: Vec<(&Case, &Case)> = shared.collect();
+        let of = |value: fn(&(&Case, &Case)) -> f64| shared.iter().map(value).collect();
         Comparison {
             sample,
             reference,
-            method_mpa,
-            reference_mpa,
+            method_mpa: of(|(s, _)| s.e_app_mpa),
+            reference_mpa: of(|(_, r)| r.e_app_mpa),
+            bv_tv: of(|(_, r)| r.bv_tv),
         }
     };
     let enough = |c: &Comparison| c.method_mpa.len() >= LEAST_SCANS;
@@ -147,6 +170,21 @@ pub fn statistics(samples: &[Sample]) -> Statistics {
             fit: regression(&c.reference_mpa, &c.method_mpa)?,
         })
     });
+    let over_bv_tv = pairs.iter().filter_map(|c| {
+        let [method, reference] = c.over_bv_tv();
+        Some(RegressionLine {
+            y: format!("E_app / (BV/TV) {} (MPa)", c.sample.method),
+            x: format!("E_app / (BV/TV) {} (MPa)", c.reference.method),
+            fit: regression(&reference, &method)?,
+        })
+    });
+    let differences = pairs.iter().filter_map(|c| {
+        Some(RegressionLine {
+            y: format!("{}, {}", c.sample.method, c.difference_from()),
+            x: "BV/TV".to_owned(),
+            fit: regression(&c.bv_tv, &c.differences_percent())?,
+        })
+    });
     let agreements = pairs.iter().filter_map(|c| {
         Some(AgreementLine {
             method: c.sample.method.clone(),
@@ -156,9 +194,17 @@ pub fn statistics(samples: &[Sample]) -> Statistics {
     });
     let (anova_between, values) = repeated(samples);
     Statistics {
-        regressions: on_bv_tv.chain(on_reference).collect(),
+        regressions: on_bv_tv
+            .chain(on_reference)
+            .chain(over_bv_tv)
+            .chain(differences)
+            .collect(),
         agreements: agreements.collect(),
-        boxes: samples.iter().flat_map(box_lines).collect(),
+        boxes: samples
+            .iter()
+            .flat_map(box_lines)
+            .chain(pairs.iter().filter_map(differences_line))
+            .collect(),
         anova: repeated_measures(&values),
         anova_between,
     }
@@ -204,6 +250,15 @@ fn box_lines(sample: &Sample) -> Vec<BoxLine> {
         lines.push(line("E_app (MPa)", Some(group), &of_group(sample, group)));
     }
     lines.into_iter().flatten().collect()
+}
+
+fn differences_line(c: &Comparison) -> Option<BoxLine> {
+    Some(BoxLine {
+        quantity: c.difference_from(),
+        method: c.sample.method.clone(),
+        group: None,
+        found: quartiles(&c.differences_percent())?,
+    })
 }
 
 pub(super) fn groups(sample: &Sample) -> Vec<&String> {

@@ -9,7 +9,7 @@ pub(in super::super) mod cases {
     use super::*;
 
     fn row(scan: usize, boundary: BoundaryRule, lp_mm: f64) -> Row {
-        let stiff = if boundary == BoundaryRule::FIRM {
+        let stiff = if boundary == BoundaryRule::Firm {
             2.0
         } else {
             1.0
@@ -36,7 +36,7 @@ pub(in super::super) mod cases {
     /// Scans s1, s2, … by floppy, firm and FFB, each at two lattice parameters.
     pub fn cohort(n: usize) -> Vec<Row> {
         let scans = (1..=n).flat_map(|scan| {
-            [BoundaryRule::FLOPPY, BoundaryRule::FIRM, BoundaryRule::Ffb]
+            [BoundaryRule::Floppy, BoundaryRule::Firm, BoundaryRule::Ffb]
                 .into_iter()
                 .flat_map(move |b| [row(scan, b, 0.2), row(scan, b, 0.1)])
         });
@@ -115,8 +115,27 @@ fn all_are_held_against_an_independent_reference() {
         pairs(&found),
         [("floppy", fe), ("firm", fe), ("FFB mean", fe)]
     );
-    assert_eq!(found.regressions.len(), 7);
+    // Each of four methods on BV/TV; three on the reference, as they are and over BV/TV, and their differences on BV/TV.
+    assert_eq!(found.regressions.len(), 4 + 3 * 3);
     assert!(found.agreements.iter().all(|a| a.found.n == 4));
+    let percent = format!("difference from {fe} (%)");
+    let line = found
+        .regressions
+        .iter()
+        .find(|r| r.y == format!("floppy, {percent}"))
+        .unwrap();
+    assert_eq!((line.x.as_str(), line.fit.n), ("BV/TV", 4));
+    // Of s1: floppy 10.1, and the limit 1.3 times its coarser 10.2 with 10 more for its bone.
+    let all = against_reference(&samples(&with_limit(cohort(4), Method::VoxelFe, 0.01)).0)
+        .into_iter()
+        .next()
+        .map(|c| c.differences_percent()[0]);
+    assert_eq!(
+        all,
+        Some(100.0 * (10.1 / (1.3 * 10.2 + 1e3 * 0.1 * 0.1) - 1.0))
+    );
+    let boxes = found.boxes.iter().filter(|b| b.quantity == percent);
+    assert_eq!(boxes.count(), 3);
 }
 
 #[test]
@@ -170,6 +189,6 @@ fn a_mean_beside_its_parts_is_no_level_of_an_analysis_of_variance() {
     let said = found.analysis_of_variance().unwrap();
     assert!(said.contains("floppy; firm over 4 scans"), "{said}");
     // Beside one part only it is a level of its own.
-    rows.retain(|row| row.key.boundary != Some(BoundaryRule::FIRM));
+    rows.retain(|row| row.key.boundary != Some(BoundaryRule::Firm));
     assert_eq!(of(&rows).anova_between, ["floppy", "FFB mean"]);
 }

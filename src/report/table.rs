@@ -22,6 +22,7 @@ pub struct Line {
     pub voxel_fe_mpa: Option<f64>,
     pub graded_extrapolated_mpa: Option<f64>,
     pub voxel_fe_extrapolated_mpa: Option<f64>,
+    pub geometry_fe_mpa: Option<f64>,
     pub floppy_over_tissue: Option<f64>,
     pub firm_over_tissue: Option<f64>,
     pub ffb_over_tissue: Option<f64>,
@@ -29,6 +30,7 @@ pub struct Line {
     pub voxel_fe_over_tissue: Option<f64>,
     pub graded_extrapolated_over_tissue: Option<f64>,
     pub voxel_fe_extrapolated_over_tissue: Option<f64>,
+    pub geometry_fe_over_tissue: Option<f64>,
     /// All solves of the line together.
     pub wall_s: Option<f64>,
     /// Stated error of the solver, and of discretisation and shape together, of each model's modulus in MPa, by [`Model`]. Not a column: the rows of
@@ -47,6 +49,7 @@ impl Line {
             Model::VoxelFe => self.voxel_fe_mpa,
             Model::GradedLimit => self.graded_extrapolated_mpa,
             Model::VoxelFeLimit => self.voxel_fe_extrapolated_mpa,
+            Model::GeometryFe => self.geometry_fe_mpa,
         }
     }
 
@@ -71,6 +74,7 @@ impl Line {
                 &mut self.voxel_fe_extrapolated_mpa,
                 &mut self.voxel_fe_extrapolated_over_tissue,
             ),
+            Model::GeometryFe => (&mut self.geometry_fe_mpa, &mut self.geometry_fe_over_tissue),
         };
         *modulus = row.e_app_mpa();
         *ratio = row.e_app_mpa().map(|e| e / row.key.young_mpa);

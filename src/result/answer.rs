@@ -60,7 +60,7 @@ fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
     let exactness = match (row.key.method, row.key.boundary) {
         (_, Some(BoundaryRule::Extrapolated)) => 0,
         (Method::VoxelFe | Method::GeometryFe, _) => 1,
-        (_, Some(BoundaryRule::GRADED)) => 2,
+        (_, Some(BoundaryRule::Graded)) => 2,
         (_, Some(BoundaryRule::Ffb)) => 3,
         _ => 4,
     };
@@ -253,7 +253,7 @@ mod tests {
     fn the_least_stated_error_answers() {
         let limit = row("a", Some(BoundaryRule::Extrapolated), 50.0, Some(1.9));
         let rows = [
-            row("a", Some(BoundaryRule::FLOPPY), 20.0, None),
+            row("a", Some(BoundaryRule::Floppy), 20.0, None),
             row("a", Some(BoundaryRule::Ffb), 60.0, Some(40.0)),
             row("a", None, 55.0, Some(9.0)),
             limit,
@@ -280,8 +280,8 @@ mod tests {
 
     #[test]
     fn what_carries_no_load_answers_only_where_all_rows_do() {
-        let broken = row("a", Some(BoundaryRule::FLOPPY), 0.0, None);
-        let graded = row("a", Some(BoundaryRule::GRADED), 3.0, None);
+        let broken = row("a", Some(BoundaryRule::Floppy), 0.0, None);
+        let graded = row("a", Some(BoundaryRule::Graded), 3.0, None);
         assert_eq!(answer_of(&[broken.clone(), graded]).method, "graded");
         let alone = answer_of(&[broken]);
         assert_eq!(
@@ -294,7 +294,7 @@ mod tests {
     fn a_row_that_is_not_converged_comes_last() {
         let mut stopped = row("a", None, 50.0, Some(0.1));
         stopped.solved.as_mut().unwrap().converged = Some(false);
-        let rows = [stopped, row("a", Some(BoundaryRule::GRADED), 40.0, None)];
+        let rows = [stopped, row("a", Some(BoundaryRule::Graded), 40.0, None)];
         assert_eq!(answer_of(&rows).method, "graded");
     }
 

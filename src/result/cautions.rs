@@ -75,7 +75,7 @@ fn strain(row: &Row) -> Option<String> {
 fn coarse(row: &Row) -> Option<String> {
     let plain = matches!(
         row.key.boundary,
-        Some(BoundaryRule::FIRM | BoundaryRule::FLOPPY | BoundaryRule::Ffb)
+        Some(BoundaryRule::Firm | BoundaryRule::Floppy | BoundaryRule::Ffb)
     );
     let thickness = row.marks.mean_thickness_mm.filter(|_| plain)?;
     (row.key.lp_mm > 0.5 * thickness).then(|| {
@@ -104,7 +104,7 @@ mod tests {
         row.key.young_mpa = 1000.0;
         row.key.strain = -0.01;
         row.key.lp_mm = 0.1;
-        row.key.boundary = Some(BoundaryRule::FLOPPY);
+        row.key.boundary = Some(BoundaryRule::Floppy);
         row.marks.mean_thickness_mm = Some(0.25);
         change(&mut row);
         row
@@ -123,7 +123,7 @@ mod tests {
             let found = cautions(&row, 5.0);
             assert!(found.len() == 1 && found[0].contains(said), "{found:?}");
         }
-        let graded = row(|r| (r.key.lp_mm, r.key.boundary) = (0.15, Some(BoundaryRule::GRADED)));
+        let graded = row(|r| (r.key.lp_mm, r.key.boundary) = (0.15, Some(BoundaryRule::Graded)));
         assert_eq!(cautions(&graded, 5.0), Vec::<String>::new());
     }
 

@@ -66,7 +66,7 @@ fn is_staircase(row: &Row) -> bool {
 }
 
 fn in_series(row: &Row) -> bool {
-    let graded = row.key.boundary == Some(BoundaryRule::GRADED);
+    let graded = row.key.boundary == Some(BoundaryRule::Graded);
     (graded || is_staircase(row))
         && row.converged() == Some(true)
         && row.e_app_mpa().is_some_and(|e| e > 0.0)
@@ -277,7 +277,7 @@ mod tests {
         }
     }
 
-    const GRADED: Option<BoundaryRule> = Some(BoundaryRule::GRADED);
+    const GRADED: Option<BoundaryRule> = Some(BoundaryRule::Graded);
 
     fn error(row: &Row) -> f64 {
         row.solved
@@ -317,7 +317,7 @@ mod tests {
         let rows = [row(GRADED, 0.1, 3.0), row(GRADED, 0.05, 2.0)];
         assert_eq!(with_extrapolated(&rows), rows);
         assert_eq!(
-            with_extrapolated(&[row(Some(BoundaryRule::FIRM), 0.1, 3.0)]).len(),
+            with_extrapolated(&[row(Some(BoundaryRule::Firm), 0.1, 3.0)]).len(),
             1
         );
     }

@@ -27,7 +27,7 @@ pub fn with_ffb(rows: &[Row], known: &[Row]) -> Vec<Row> {
 fn are_a_pair(a: &Row, b: &Row) -> bool {
     let [a, b] = [a, b].map(|row| &row.key);
     let boundaries = [a.boundary, b.boundary];
-    let one_of_each = [BoundaryRule::FIRM, BoundaryRule::FLOPPY]
+    let one_of_each = [BoundaryRule::Firm, BoundaryRule::Floppy]
         .into_iter()
         .all(|part| boundaries.contains(&Some(part)));
     // Without a modulus there is no bracket of it.
@@ -38,7 +38,7 @@ fn are_a_pair(a: &Row, b: &Row) -> bool {
 /// The mean states no error where its parts are no bracket.
 fn checked(mut mean: Row, parts: [&Row; 2], known: &[Row]) -> Row {
     let part = |boundary| parts.into_iter().find(|r| r.key.boundary == Some(boundary));
-    let pair = part(BoundaryRule::FLOPPY).zip(part(BoundaryRule::FIRM));
+    let pair = part(BoundaryRule::Floppy).zip(part(BoundaryRule::Firm));
     let fault = pair.and_then(|(floppy, firm)| {
         voxel_check::bracket_fault(floppy, firm, voxel_check::witness(&mean, known))
     });
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     fn row(boundary: BoundaryRule, lp_mm: f64, e: f64) -> Row {
-        let firm = boundary == BoundaryRule::FIRM;
+        let firm = boundary == BoundaryRule::Firm;
         Row {
             key: Settings {
                 scan: "a".to_owned(),
@@ -172,10 +172,10 @@ mod tests {
     #[test]
     fn the_mean_follows_the_second_of_its_pair() {
         let rows = [
-            row(BoundaryRule::FIRM, 0.1, 30.0),
-            row(BoundaryRule::FIRM, 0.2, 50.0),
-            row(BoundaryRule::FLOPPY, 0.1, 10.0),
-            row(BoundaryRule::GRADED, 0.1, 19.0),
+            row(BoundaryRule::Firm, 0.1, 30.0),
+            row(BoundaryRule::Firm, 0.2, 50.0),
+            row(BoundaryRule::Floppy, 0.1, 10.0),
+            row(BoundaryRule::Graded, 0.1, 19.0),
         ];
         let all = with_ffb(&rows, &[]);
         assert_eq!(all.len(), 5);
@@ -198,8 +198,8 @@ mod tests {
                 row
             };
             let rows = [
-                part(BoundaryRule::FIRM, firm),
-                part(BoundaryRule::FLOPPY, floppy),
+                part(BoundaryRule::Firm, firm),
+                part(BoundaryRule::Floppy, floppy),
             ];
             with_ffb(&rows, &[])[2].converged()
         };
@@ -214,8 +214,8 @@ mod tests {
     #[test]
     fn means_are_not_made_twice() {
         let rows = [
-            row(BoundaryRule::FIRM, 0.1, 3.0),
-            row(BoundaryRule::FLOPPY, 0.1, 1.0),
+            row(BoundaryRule::Firm, 0.1, 3.0),
+            row(BoundaryRule::Floppy, 0.1, 1.0),
         ];
         let once = with_ffb(&rows, &[]);
         assert_eq!(with_ffb(&once, &[]), once);
@@ -224,8 +224,8 @@ mod tests {
     #[test]
     fn firm_below_floppy_states_no_error() {
         let rows = [
-            row(BoundaryRule::FLOPPY, 0.1, 62.0),
-            row(BoundaryRule::FIRM, 0.1, 45.0),
+            row(BoundaryRule::Floppy, 0.1, 62.0),
+            row(BoundaryRule::Firm, 0.1, 45.0),
         ];
         let mean = &with_ffb(&rows, &[])[2];
         assert_eq!((mean.e_app_mpa(), mean.error_mpa()), (Some(53.5), None));
@@ -239,9 +239,9 @@ mod tests {
     #[test]
     fn no_mean_is_made_of_a_lattice_that_carries_nothing() {
         let rows = |note: Option<&str>| {
-            let mut floppy = row(BoundaryRule::FLOPPY, 0.1, 0.0);
+            let mut floppy = row(BoundaryRule::Floppy, 0.1, 0.0);
             floppy.marks.note = note.map(str::to_owned);
-            with_ffb(&[floppy, row(BoundaryRule::FIRM, 0.1, 45.0)], &[])
+            with_ffb(&[floppy, row(BoundaryRule::Firm, 0.1, 45.0)], &[])
         };
         let apart = rows(Some(notes::NO_ANSWER));
         assert_eq!((apart[2].e_app_mpa(), apart[2].error_mpa()), (None, None));
@@ -252,16 +252,16 @@ mod tests {
         assert_eq!(gap[2].e_app_mpa(), None);
         assert!(gap[0].is_disconnected());
         // No bone connects the faces: both are right.
-        let none = [BoundaryRule::FLOPPY, BoundaryRule::FIRM].map(|b| row(b, 0.1, 0.0));
+        let none = [BoundaryRule::Floppy, BoundaryRule::Firm].map(|b| row(b, 0.1, 0.0));
         assert_eq!(with_ffb(&none, &[])[2].e_app_mpa(), Some(0.0));
     }
 
     #[test]
     fn other_settings_are_no_pair() {
-        let mut stiffer = row(BoundaryRule::FLOPPY, 0.1, 1.0);
+        let mut stiffer = row(BoundaryRule::Floppy, 0.1, 1.0);
         stiffer.key.young_mpa = 2.0;
         assert_eq!(
-            with_ffb(&[row(BoundaryRule::FIRM, 0.1, 3.0), stiffer], &[]).len(),
+            with_ffb(&[row(BoundaryRule::Firm, 0.1, 3.0), stiffer], &[]).len(),
             2
         );
     }

@@ -22,6 +22,8 @@ pub struct Row {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Solution {
     pub sites: Option<u64>,
+    /// Volume of the model that carries load (cells of sites, of connected and weighted lattices their bone; elements) over TV.
+    pub model_bv_tv: Option<f64>,
     pub dropped_sites: Option<u64>,
     pub unknowns: Option<u64>,
     pub iterations: Option<u64>,

@@ -66,10 +66,6 @@ pub enum BoundaryRule {
 }
 
 impl BoundaryRule {
-    pub const FIRM: BoundaryRule = BoundaryRule::Firm;
-    pub const FLOPPY: BoundaryRule = BoundaryRule::Floppy;
-    pub const GRADED: BoundaryRule = BoundaryRule::Graded;
-
     pub fn name(self) -> &'static str {
         match self {
             BoundaryRule::Firm => "firm",
@@ -164,9 +160,9 @@ words!(
 words!(
     BoundaryRule,
     [
-        BoundaryRule::FIRM,
-        BoundaryRule::FLOPPY,
-        BoundaryRule::GRADED,
+        BoundaryRule::Firm,
+        BoundaryRule::Floppy,
+        BoundaryRule::Graded,
         BoundaryRule::Ffb,
         BoundaryRule::Extrapolated
     ]

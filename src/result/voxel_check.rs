@@ -126,7 +126,7 @@ mod tests {
     }
 
     fn fault(floppy: f64, firm: f64, voxels: f64) -> Option<String> {
-        let [floppy, firm] = [(BoundaryRule::FLOPPY, floppy), (BoundaryRule::FIRM, firm)]
+        let [floppy, firm] = [(BoundaryRule::Floppy, floppy), (BoundaryRule::Firm, firm)]
             .map(|(boundary, e)| row(Some(boundary), e));
         bracket_fault(&floppy, &firm, Some(&row(None, voxels)))
     }
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_witness_is_one_element_a_voxel_under_the_same_conditions() {
-        let floppy = row(Some(BoundaryRule::FLOPPY), 1.0);
+        let floppy = row(Some(BoundaryRule::Floppy), 1.0);
         let with = |change: fn(&mut Row)| {
             let mut voxels = row(None, 1.0);
             change(&mut voxels);

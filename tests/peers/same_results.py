@@ -92,9 +92,10 @@ def differences(old, new):
     if len(old_rows) != len(new_rows):
         yield f"{len(old_rows)} rows, now {len(new_rows)}"
     for number, (a, b) in enumerate(zip(old_rows, new_rows), 1):
-        for column in a.keys() | b.keys():
-            if a.get(column) != b.get(column):
-                yield f"row {number}, {column}: {a.get(column)}, now {b.get(column)}"
+        # Columns that a newer program added say nothing of the old ones.
+        for column in a:
+            if a[column] != b.get(column, "no such column"):
+                yield f"row {number}, {column}: {a[column]}, now {b.get(column, 'no such column')}"
     if old_matrices != new_matrices:
         yield "stiffness.json: another matrix"
 
@@ -118,6 +119,9 @@ def main():
         found = list(differences(*tables))
         failed |= bool(found)
         print(f"{name}: {len(tables[0][0])} rows, " + ("the same" if not found else "DIFFERENT"))
+        added = [c for c in tables[1][0][0] if c not in tables[0][0][0]] if tables[0][0] and tables[1][0] else []
+        if added:
+            print(f"    columns added: {', '.join(added)}")
         for words in found[:20]:
             print(f"    {words}")
     sys.exit(1 if failed else 0)

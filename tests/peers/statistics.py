@@ -99,6 +99,9 @@ def expected():
     assert abs(line.slope / fit.params[1] - 1) < 1e-12 and abs(line.pvalue / fit.pvalues[1] - 1) < 1e-9
     difference = d["A"] - d["B"]
     bias, sd = difference.mean(), difference.std(ddof=1)
+    both = (d["A"] + d["B"]) / 2
+    percent = 100 * difference / both
+    tested = scipy.stats.linregress(both, percent)
     long = pd.DataFrame(
         [(s, m, d[m][s]) for m in "ABC" for s in range(8)], columns=["specimen", "method", "value"]
     )
@@ -126,6 +129,12 @@ def expected():
             "BA_LOWER": bias - 1.96 * sd,
             "BA_UPPER": bias + 1.96 * sd,
             "BA_P": scipy.stats.ttest_rel(d["A"], d["B"]).pvalue,
+            "BA_PERCENT": percent.mean(),
+            "BA_PERCENT_SD": percent.std(ddof=1),
+            "BA_PERCENT_LOWER": percent.mean() - 1.96 * percent.std(ddof=1),
+            "BA_PERCENT_UPPER": percent.mean() + 1.96 * percent.std(ddof=1),
+            "BA_SLOPE": tested.slope,
+            "BA_SLOPE_P": tested.pvalue,
         },
         "anova.rs": {"RM_F": table["F Value"].iloc[0], "RM_P": table["Pr > F"].iloc[0], "GG_EPSILON": epsilon, "GG_P": p_gg},
         "quartiles.rs": {"Q_1": q1, "Q_2": q2, "Q_3": q3},

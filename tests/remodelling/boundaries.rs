@@ -1,4 +1,4 @@
-//! What the paper leaves open at the loaded edges (spec A6).
+//! What the paper leaves open at the loaded edges.
 
 use super::square::{FIVE_DIGITS, S2, SIX_DIGITS, Square, assert_near, continuum_square, simulate};
 

@@ -1,4 +1,4 @@
-//! Peridynamics on the unit square at fixed ratio and at fixed horizon (spec A4, A5).
+//! Peridynamics on the unit square at fixed ratio and at fixed horizon (figures 4 and 5 of Schaller et al. 2022).
 
 use super::square::{
     CONTINUOUS, S1, S2, SIX_DIGITS, Square, assert_near, continuum_square, local_text, simulate,

@@ -1,4 +1,4 @@
-//! Lattice constants and local references (spec A2, A3).
+//! Lattice constants and local references (constants of Schaller et al. 2022, appendix A; the unit square of its figures 4 and 5).
 
 use super::square::{
     FIVE_DIGITS, S2, SIX_DIGITS, assert_near, continuum_square, local_text, simulate,

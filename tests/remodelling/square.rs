@@ -47,7 +47,7 @@ pub fn simulate(text: &str) -> Result<(Summary, Recorder)> {
     Ok((summary, recorder))
 }
 
-/// Step heights of the spec's main set S2 (per edge; the paper's figure gives none).
+/// Step heights of the independent prototype's second set (per edge; the paper's figure gives none).
 pub const S2: [f64; 4] = [0.06, 0.075, 0.09, 0.105];
 pub const S1: [f64; 4] = [0.04, 0.08, 0.12, 0.16];
 
@@ -122,7 +122,7 @@ pub fn assert_near<const N: usize>(found: [f64; N], reference: [f64; N], toleran
     );
 }
 
-/// The spec's tolerance: another code meets the printed digits to +-2 in the last one. This for values printed to six.
+/// Another code meets the printed digits to +-2 in the last one. This for values printed to six.
 pub const SIX_DIGITS: f64 = 2e-6;
 /// And this for those printed to five only.
 pub const FIVE_DIGITS: f64 = 2e-5;

@@ -1,4 +1,4 @@
-//! Exact tangents (spec A1), Newton's method, and the fast sum over bonds.
+//! Exact tangents (appendix A of Schaller et al. 2022, corrected), Newton's method, and the fast sum over bonds.
 
 use bonepd_ct::discretisation::plane::Points;
 use bonepd_ct::discretisation::plane::family::{Bond, Stencil};

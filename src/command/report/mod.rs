@@ -8,7 +8,7 @@ use crate::command::stiffness::RECORD;
 use crate::command::{answer, fields};
 use crate::error::Result;
 use crate::image::scan;
-use crate::io::{atomic, table};
+use crate::io::{atomic, own_files, table};
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
@@ -32,13 +32,13 @@ use crate::result::strength::CurvePoint;
 use std::path::{Path, PathBuf};
 
 /// The recipe as it was run, in the output folder of a run.
-pub const RECIPE: &str = "recipe.toml";
+pub const RECIPE: &str = own_files::RECIPE;
 
 /// The recipe of an earlier run into the same folder, where it differs.
-pub const OLD_RECIPE: &str = "recipe.old.toml";
+pub const OLD_RECIPE: &str = own_files::OLD_RECIPE;
 
 /// One line a scan.
-pub const ANSWERS: &str = "answers.csv";
+pub const ANSWERS: &str = own_files::ANSWERS;
 
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Scans that
 /// were solved again in their own folders after the run are read from there. Returns the files written.

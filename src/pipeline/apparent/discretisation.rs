@@ -131,6 +131,8 @@ pub struct System<'a, O, C, G> {
     pub sites: usize,
     /// Those that exist but carry none.
     pub dropped: usize,
+    /// Volume of the sites' cells (connected, weighted: of their bone) or of the elements that carry load.
+    pub volume_mm3: f64,
     /// Where sites are on an integer grid and how far the operator couples them; only where mechanisms are to be counted.
     pub places: Option<Places>,
 }

@@ -183,6 +183,7 @@ impl<D: Discretisation> Solve for Of<D> {
         let solved = Solved {
             sites: system.sites,
             dropped: system.dropped,
+            model_bv_tv: Some(system.volume_mm3 / prepared.specimen.tv_mm3),
             unknowns: system.held.free::<3>(),
             iterations,
             residual: info.residual,

@@ -1,6 +1,6 @@
 //! Owns the count of mechanisms: motions that cost next to no energy and are not rigid motions of the whole.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::operator::Operator;
 use crate::operator::held::Held;
 use crate::operator::probe::{Probed, probe};
@@ -29,7 +29,12 @@ pub fn mechanisms(
         return Ok(0);
     }
     let largest = largest_eigenvalue(&probed.scaled(0.0));
-    let free = negative_eigenvalues(&probed.scaled(FREE * largest))?;
+    let free = negative_eigenvalues(&probed.scaled(FREE * largest)).map_err(|found| {
+        Error::specimen(
+            format!("counting mechanisms by a factorisation failed: {found}"),
+            "leave --mechanisms out, crop the specimen, or choose larger elements",
+        )
+    })?;
     Ok(free.saturating_sub(rigid_motions(operator, held, at, &probed)))
 }
 

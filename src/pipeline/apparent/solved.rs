@@ -38,6 +38,8 @@ impl Moduli {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solved {
     pub sites: usize,
+    /// Volume of the model that carries load over TV.
+    pub model_bv_tv: Option<f64>,
     pub dropped: usize,
     pub unknowns: usize,
     pub iterations: usize,
@@ -67,6 +69,7 @@ impl Solved {
         };
         Solved {
             sites: 0,
+            model_bv_tv: None,
             dropped,
             unknowns: 0,
             iterations: 0,
@@ -136,6 +139,7 @@ impl Solved {
         let modulus = |v: f64| Some(v).filter(|v| blank.key.load.has_modulus() && !v.is_nan());
         let solution = Solution {
             sites: count(self.sites),
+            model_bv_tv: self.model_bv_tv,
             dropped_sites: count(self.dropped),
             unknowns: count(self.unknowns),
             iterations: count(self.iterations),

@@ -2,7 +2,7 @@
 
 use crate::record::column::{BV_TV, Column, SCAN, YOUNG, column};
 
-pub const E_APP: [Column; 21] = [
+pub const E_APP: [Column; 23] = [
     SCAN,
     column(
         "structure",
@@ -36,6 +36,7 @@ pub const E_APP: [Column; 21] = [
         "MPa",
         "limit of voxel elements",
     ),
+    column("geometry_fe_mpa", "MPa", "E_app by smooth elements"),
     column("floppy_over_tissue", "", "floppy_mpa over young_mpa"),
     column("firm_over_tissue", "", "firm_mpa over young_mpa"),
     column("ffb_over_tissue", "", "ffb_mpa over young_mpa"),
@@ -50,6 +51,11 @@ pub const E_APP: [Column; 21] = [
         "voxel_fe_extrapolated_over_tissue",
         "",
         "voxel_fe_extrapolated_mpa over young_mpa",
+    ),
+    column(
+        "geometry_fe_over_tissue",
+        "",
+        "geometry_fe_mpa over young_mpa",
     ),
     column("wall_s", "s", "wall time of all solves of the row"),
 ];
@@ -71,7 +77,7 @@ pub const REGRESSIONS: [Column; 10] = [
     column("intercept_p", "", "p of intercept 0, two-sided"),
 ];
 
-pub const AGREEMENT: [Column; 8] = [
+pub const AGREEMENT: [Column; 14] = [
     column("method", "", "the method"),
     column("reference", "", "what it is compared with"),
     column("n", "", "scans that have both"),
@@ -80,18 +86,44 @@ pub const AGREEMENT: [Column; 8] = [
     column("lower_limit", "", "bias less 1.96 sd, in MPa"),
     column("upper_limit", "", "bias plus 1.96 sd, in MPa"),
     column("bias_p", "", "p of bias 0 (paired t test), two-sided"),
+    column(
+        "bias_percent",
+        "%",
+        "mean of the differences over the mean of both",
+    ),
+    column("sd_percent", "%", "standard deviation of those"),
+    column(
+        "lower_limit_percent",
+        "%",
+        "bias_percent less 1.96 sd_percent",
+    ),
+    column(
+        "upper_limit_percent",
+        "%",
+        "bias_percent plus 1.96 sd_percent",
+    ),
+    column(
+        "slope_percent_per_mpa",
+        "%/MPa",
+        "slope of those differences over the mean of both",
+    ),
+    column("slope_p", "", "p of that slope 0, two-sided"),
 ];
 
 pub const DISTRIBUTIONS: [Column; 9] = [
-    column("quantity", "", "E_app or E_app over BV/TV, in MPa"),
+    column(
+        "quantity",
+        "",
+        "E_app or E_app over BV/TV, in MPa, or the difference from the reference, in %",
+    ),
     column("method", "", "the method"),
     column("group", "", "from the manifest; NA: all scans"),
     column("n", "", "scans"),
-    column("min", "", "least value, in MPa"),
-    column("q1", "", "first quartile, in MPa"),
-    column("median", "", "median, in MPa"),
-    column("q3", "", "third quartile, in MPa"),
-    column("max", "", "largest value, in MPa"),
+    column("min", "", "least value, in the unit of the quantity"),
+    column("q1", "", "first quartile"),
+    column("median", "", "median"),
+    column("q3", "", "third quartile"),
+    column("max", "", "largest value"),
 ];
 
 pub const ANOVA: [Column; 8] = [

@@ -93,6 +93,8 @@ pub(super) struct Columns {
     yield_strain: Option<f64>,
     #[serde(default)]
     max_stress_mpa: Option<f64>,
+    #[serde(default)]
+    model_bv_tv: Option<f64>,
 }
 
 impl From<Row> for Columns {
@@ -162,6 +164,7 @@ impl From<Row> for Columns {
             yield_stress_mpa: solved.strength.yield_stress_mpa,
             yield_strain: solved.strength.yield_strain,
             max_stress_mpa: solved.strength.max_stress_mpa,
+            model_bv_tv: solved.model_bv_tv,
         }
     }
 }
@@ -201,6 +204,7 @@ impl TryFrom<Columns> for Row {
         };
         let solved = Solution {
             sites: c.sites,
+            model_bv_tv: c.model_bv_tv,
             dropped_sites: c.dropped_sites,
             unknowns: c.unknowns,
             iterations: c.iterations,

@@ -238,6 +238,7 @@ pub struct Fracture {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vibration {
+    /// Mass per mm³; of a tetrachiral lattice that of its blocks.
     pub density: f64,
     pub modes: usize,
 }
@@ -335,7 +336,10 @@ fn elastic<const D: usize>(
 ) -> Result<Summary> {
     let solid = solid::Solid::<D>::new(scene, model, elasticity, tensor, setup)?;
     match &model.problem {
-        Problem::Vibration { vibration, .. } => modes::run(solid, vibration, setup, observer),
+        Problem::Vibration { vibration, .. } => {
+            let vibration = vibration.of_continuum(&elasticity.material);
+            modes::run(solid, &vibration, setup, observer)
+        }
         Problem::Fracture { fracture, .. } => {
             fracture::run(scene, model, fracture, solid, setup, observer)
         }

@@ -65,7 +65,7 @@ pub fn run<const D: usize>(
 ) -> Result<Summary> {
     observer.start(&setup.points, vibration.modes)?;
     let (found, shapes, unknowns) = modes(&solid, vibration, setup)?;
-    let mut numbers = Vec::new();
+    let mut numbers = vec![("density".to_owned(), vibration.density)];
     let count = found.modes.len();
     if !found.settled {
         observer.say("the modes did not converge: ask for fewer; those given are approximate");

@@ -1,6 +1,6 @@
 //! Owns the tensors of a scene in its own axes.
 
-use super::{Conduction, Elasticity, Material, TetrachiralParams};
+use super::{Conduction, Elasticity, Material, TetrachiralParams, Vibration};
 use crate::error::{Error, Result};
 use crate::physics::continuum_molecular::conductivity::Conductivity;
 use crate::physics::continuum_molecular::tensor::{Plane, PlaneTensor};
@@ -39,6 +39,21 @@ impl Elasticity {
             }
         };
         Ok(tensor.turned(zeta))
+    }
+}
+
+impl Vibration {
+    /// The same with the density of the equivalent continuum. Blocks of a tetrachiral lattice have a side of cos β times the period and
+    /// leave square holes, so the continuum has cos² β of their density (Diana 2023 leaves this out).
+    pub fn of_continuum(&self, material: &Material) -> Vibration {
+        let filled = match material {
+            Material::Tetrachiral(lattice) => lattice.chirality_deg.to_radians().cos().powi(2),
+            _ => 1.0,
+        };
+        Vibration {
+            density: filled * self.density,
+            ..*self
+        }
     }
 }
 

@@ -188,6 +188,9 @@ impl Discretisation for GeometryModel {
             load_steps: None,
             sites: mesh.elements.len(),
             dropped: self.report.loaded.dropped_elements,
+            volume_mm3: (0..mesh.elements.len())
+                .map(|e| self.model.shape(e).volume)
+                .sum(),
             places: None,
         }
     }

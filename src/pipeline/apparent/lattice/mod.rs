@@ -56,6 +56,8 @@ struct Placed<'a> {
     indices: &'a [[i32; 3]],
     grips: Grips,
     dropped: usize,
+    /// Of the sites' cells, or of the bone in them.
+    volume_mm3: f64,
 }
 
 impl<'a> Placed<'a> {
@@ -140,6 +142,7 @@ impl<'a> Placed<'a> {
             load_steps: None,
             sites: self.indices.len(),
             dropped: self.dropped,
+            volume_mm3: self.volume_mm3,
             places,
         }
     }

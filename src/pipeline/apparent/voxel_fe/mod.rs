@@ -159,6 +159,7 @@ impl Discretisation for VoxelModel {
             load_steps: self.params.plasticity.as_ref().map(|_| self.load_steps()),
             sites: mesh.elements,
             dropped: mesh.dropped,
+            volume_mm3: mesh.elements as f64 * mesh.grid.voxel_mm3(),
             places: self.params.mechanisms.then(|| Places {
                 at: supports::grid_places(mesh),
                 reach: 1,

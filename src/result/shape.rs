@@ -79,17 +79,15 @@ pub fn of_interpolated(blur_voxels: f64, learnt: &Learnt) -> Stated {
 
 /// Shape error of smooth elements, relative and over `S`: of sharp grey values, of those blurred by [`TRUTH_SET_BLUR`] and of masks.
 /// Set on half A of the truth set: `tests/bench/geometry_fe.py`, `reports/geometry-fe.md`.
-const SMOOTH_SHAPE: [f64; 3] = [0.045, 0.12, 0.09];
+const SMOOTH_SHAPE: [f64; 3] = [0.05, 0.12, 0.09];
 
 /// Discretisation error of smooth elements, relative and over `S` times the cell's edge in voxels. First order: cells fill what is
 /// left between struts that meet at an acute angle. Where edges are blurred there is less of that.
 const SMOOTH_CELLS: [f64; 3] = [0.025, 0.02, 0.03];
 
-/// How much larger the shape error of smooth elements is whose Euler number is not that of the mask.
-const OTHER_TOPOLOGY: f64 = 1.25;
-
-/// The error of smooth elements in cells of `size` voxels, from one solve. `is_other`: their Euler number is not that of the mask.
-pub fn of_smooth(image: Image, size: f64, surface: f64, is_other: bool) -> Stated {
+/// The error of smooth elements in cells of `size` voxels, from one solve. Their shape error grows with the difference of their Euler
+/// number from that of the mask, in parts of the mask's, up to twice: `euler` holds both.
+pub fn of_smooth(image: Image, size: f64, surface: f64, [mesh, mask]: [i64; 2]) -> Stated {
     let between = |[sharp, blurred, mask]: [f64; 3]| match image {
         Image::Grey { blur_voxels } => {
             let share = (blur_voxels / TRUTH_SET_BLUR).clamp(0.0, 1.0);
@@ -97,10 +95,10 @@ pub fn of_smooth(image: Image, size: f64, surface: f64, is_other: bool) -> State
         }
         Image::Mask => mask,
     };
-    let grown = if is_other { OTHER_TOPOLOGY } else { 1.0 };
+    let apart = mesh.abs_diff(mask) as f64 / mask.unsigned_abs().max(1) as f64;
     Stated {
         discretization: between(SMOOTH_CELLS) * surface * size,
-        shape: between(SMOOTH_SHAPE) * surface * grown,
+        shape: between(SMOOTH_SHAPE) * surface * (1.0 + apart.min(1.0)),
     }
 }
 
@@ -222,16 +220,22 @@ mod tests {
 
     #[test]
     fn errors_of_smooth_elements_grow_with_cells_blur_and_another_topology() {
-        let total = |image, size, is_other| {
-            let stated = of_smooth(image, size, 2.0, is_other);
+        let total = |image, size, mesh| {
+            let stated = of_smooth(image, size, 2.0, [mesh, -10]);
             stated.discretization + stated.shape
         };
         let grey = |blur_voxels| Image::Grey { blur_voxels };
-        let sharp = total(grey(0.0), 1.0, false);
-        assert!((sharp - 2.0 * (0.025 + 0.045)).abs() < 1e-12, "{sharp}");
-        assert!(total(grey(0.0), 2.0, false) > sharp && total(grey(0.0), 1.0, true) > sharp);
-        let blurred = total(grey(TRUTH_SET_BLUR), 1.0, false);
+        let sharp = total(grey(0.0), 1.0, -10);
+        assert!((sharp - 2.0 * (0.025 + 0.05)).abs() < 1e-12, "{sharp}");
+        assert!(total(grey(0.0), 2.0, -10) > sharp);
+        let other = total(grey(0.0), 1.0, -15);
+        assert!(
+            (other - 2.0 * (0.025 + 1.5 * 0.05)).abs() < 1e-12,
+            "{other}"
+        );
+        assert_eq!(total(grey(0.0), 1.0, 90), total(grey(0.0), 1.0, -20));
+        let blurred = total(grey(TRUTH_SET_BLUR), 1.0, -10);
         assert!((blurred - 2.0 * (0.02 + 0.12)).abs() < 1e-12, "{blurred}");
-        assert!(total(Image::Mask, 1.0, false) > sharp);
+        assert!(total(Image::Mask, 1.0, -10) > sharp);
     }
 }

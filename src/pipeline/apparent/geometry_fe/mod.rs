@@ -234,7 +234,7 @@ impl Discretisation for GeometryModel {
         Ok(Recorded {
             surface: sensitivity::of(model, surface, self.is_of_grey, solved.u),
             note: Some(self.report.words(self.is_of_grey)),
-            is_other_topology: self.report.euler[0] != self.report.euler[1],
+            euler: self.report.euler,
             mesh: recorder.fields(),
             failure: table.iter().find(own).cloned(),
             details: Details {

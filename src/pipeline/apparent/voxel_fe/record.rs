@@ -81,7 +81,7 @@ impl<'a> Recorder<'a> {
                 .then(|| self.surface())
                 .flatten(),
             note: None,
-            is_other_topology: false,
+            euler: [0; 2],
             sites: None,
             mesh: None,
             details: Details {

@@ -61,7 +61,11 @@ pub fn fit(mesh: &mut Mesh, surface: &Surface) {
             return [0.0; 3];
         }
         let by = (gaps / size).clamp(-most, most);
-        free.map(|f| by * whole * f / squared)
+        let moved = free.map(|f| by * whole * f / squared);
+        match mesh.is_across_plane(before[v], [0, 1, 2].map(|a| before[v][a] + moved[a])) {
+            true => [0.0; 3],
+            false => moved,
+        }
     };
     let mut moves: Vec<[f64; 3]> = sums.par_iter().enumerate().map(move_of).collect();
     for _ in 0..4 {

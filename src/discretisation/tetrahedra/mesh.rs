@@ -59,6 +59,13 @@ impl Mesh {
         on
     }
 
+    /// Whether a face of the box or a plane of `inner_mm` lies between two places, or at the second one only.
+    pub fn is_across_plane(&self, from: [f64; 3], to: [f64; 3]) -> bool {
+        let faces = (0..3).flat_map(|a| [(a, 0.0), (a, self.size_mm[a])]);
+        let mut planes = faces.chain(self.inner_mm.iter().copied());
+        planes.any(|(a, plane)| from[a] != to[a] && (from[a] - plane) * (to[a] - plane) <= 0.0)
+    }
+
     /// The same mesh of the elements that `keep` names, without vertices that none uses.
     pub fn retain(&mut self, keep: impl Fn(usize) -> bool) {
         let mut at = 0;

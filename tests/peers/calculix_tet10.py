@@ -23,7 +23,6 @@ LOADS = [
     ["--axis", "x"],
     ["--grip-mm", "0.07", "--poisson", "0.1"],
     ["--grip-mm", "0.05", "--ends", "bonded"],
-    ["--element-mm", "0.022"],
     ["--load", "shear-x"],
     ["--load", "shear-y", "--grip-mm", "0.05"],
 ]
@@ -31,7 +30,7 @@ MIXED = [["--material", "labels:1=800/0.3,2=2500/0.3"], ["--material", "labels:1
 
 
 def compare(folder, name, flags):
-    command = [PROGRAM, "solve", folder, "--method", "geometry-fe", "--tolerance", "1e-9", "--export", "inp", "--json", "--force"]
+    command = [PROGRAM, "solve", folder, "--method", "geometry-fe", "--tolerance", "1e-9", "--export", "inp", "--json", "--force", "--element-mm", "0.03"]
     run = subprocess.run([*command, *flags], capture_output=True, text=True)
     if run.returncode != 0:
         sys.exit(f"{name} {flags}: {run.stderr}")

@@ -102,7 +102,7 @@ fn an_error_that_cannot_be_met_is_said_in_words() {
 
 #[test]
 #[ignore = "needs the real stack (BONEPD_STACK)"]
-fn graded_lattices_of_the_real_stack_are_near_voxel_elements() {
+fn connected_lattices_of_the_real_stack_are_near_voxel_elements() {
     let stack = real_stack();
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().to_str().unwrap();

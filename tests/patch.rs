@@ -122,9 +122,9 @@ fn an_affine_field_is_in_equilibrium_inside() {
     }
 }
 
-/// Shares are 1 in solid bone: a graded lattice is the uniform one there, and its energy the solid's.
+/// Shares are 1 in solid bone: a connected lattice is the uniform one there, and its energy the solid's.
 #[test]
-fn a_graded_lattice_of_solid_bone_has_its_stiffness() {
+fn a_connected_lattice_of_solid_bone_has_its_stiffness() {
     let case = Case {
         structure: Structure::Sc,
         lp_mm: LP_MM,

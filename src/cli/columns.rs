@@ -12,7 +12,7 @@ use std::io::Write;
 /// Names end in their unit: _mm, _mm3, _mpa, _n, _s, _mib. Missing values are NA.
 #[derive(Args)]
 pub struct ColumnsArgs {
-    /// Of this file only, as results.csv or answers.csv
+    /// Print the columns of this file only, as results.csv or answers.csv
     file: Option<String>,
 }
 

@@ -8,7 +8,7 @@ use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Print what is known of a scan: size, voxel size, values, calibration, orientation, what to threshold by
+/// Print what is known of a scan: size, voxel size, values, calibration, orientation, suggested threshold
 #[derive(Args)]
 pub struct InfoArgs {
     /// The scan: a file or a folder of slices

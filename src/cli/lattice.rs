@@ -21,11 +21,11 @@ pub struct LatticeArgs {
     dir: PathBuf,
     #[command(flatten)]
     settings: LatticeSettings,
-    /// Also write each lattice for another program: lammps (data file; bonds alone, so always of Poisson's ratio 0.25, where
-    /// the default of `solve` is 0.3), vtk (ParaView, OVITO)
+    /// Also write each lattice for another program: lammps (data file with pair bonds only, which fixes
+    /// Poisson's ratio at 0.25; the default of `solve` is 0.3), vtk (ParaView, OVITO)
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', value_parser = ["lammps", "vtk"])]
     export: Vec<String>,
-    /// Of an exported model: different stiffnesses of bonds at most; more are rounded to the means of as many bins
+    /// Maximum number of different bond stiffnesses in an exported model; more are rounded to the means of as many bins
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
     bins: u16,
     #[command(flatten, next_help_heading = "Tissue of exported lattices (lammps)")]

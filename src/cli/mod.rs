@@ -56,7 +56,7 @@ struct Shared {
     /// No progress and no remarks: results on stdout, warnings and errors on stderr
     #[arg(long, global = true, help_heading = "Shared")]
     quiet: bool,
-    /// More detail; of a run also the results of each solve
+    /// More detail; in a run also the results of each solve
     #[arg(
         short,
         long,

@@ -8,7 +8,7 @@ use std::io::Write;
 
 /// Print a recipe or a scene that is in the program, to keep and change; without a name, list them
 ///
-/// `bonepd-ct recipe paper > paper.toml`; `bonepd-ct run paper SCAN -o OUT` takes it as it is.
+/// `bonepd-ct recipe paper > paper.toml`; `bonepd-ct run paper SCAN -o OUT` uses it unchanged.
 #[derive(Args)]
 pub struct RecipeArgs {
     /// Name of the recipe or scene

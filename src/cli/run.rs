@@ -17,8 +17,8 @@ use std::path::PathBuf;
 /// Take scans through all steps of a recipe: segment, lattice, solve, report
 ///
 /// Each scan stands alone: one that fails is named at the end (exit code 1) and the others finish. Results are in
-/// OUT/<scan>/ with a log, all rows together in OUT/results.csv, tables and figures in OUT/report/. A setting given here wins over
-/// the recipe's. Started again, a run keeps what is up to date and goes on where it was stopped.
+/// OUT/<scan>/ with a log, all rows together in OUT/results.csv, tables and figures in OUT/report/. Options here override
+/// the recipe. A run that is started again keeps what is up to date and continues where it stopped.
 #[derive(Args)]
 pub struct RunArgs {
     /// Recipe file (TOML), or the name of a recipe in the program, as paper or hrpqct (`bonepd-ct recipe` lists them)
@@ -30,7 +30,7 @@ pub struct RunArgs {
     /// Folder for the results
     #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
-    /// Scans at a time
+    /// Number of scans at a time
     #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     jobs: u16,
     /// Memory that scans running at a time may take together, by estimate [default: what is free]

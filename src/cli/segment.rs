@@ -29,16 +29,16 @@ pub struct SegmentArgs {
 #[derive(Args)]
 #[command(next_help_heading = "Segmentation")]
 pub struct SegmentSettings {
-    /// Voxel size in mm, one number or one per axis; overrides the file's. The axes are x, y, z as `info` prints them: those of
-    /// the patient or the world where the file says how it lies in it, else as stored
+    /// Voxel size in mm, one number or one per axis; overrides the file's. The axes x, y, z are those that `info`
+    /// prints: patient or world axes where the file gives its orientation, else the stored ones
     #[arg(long, value_name = "MM[,MM,MM]", value_parser = words::sizes)]
     spacing: Option<[f64; 3]>,
     /// What is in a file of voxels without a header (.raw, .vol), as 512,512,300,uint16; add `be` for big-endian numbers
     /// (uint16be), and the bytes before the first voxel (512,512,300,uint16,1024)
     #[arg(long, value_name = "NX,NY,NZ,TYPE[,SKIP]")]
     raw: Option<Contents>,
-    /// Grey values of Scanco files (AIM, ISQ), and so the threshold: as stored (native), in HU, or in mg HA/cm³; hu-where-known
-    /// leaves files without a calibration as they are, where hu refuses them [default: native, with a warning]
+    /// Unit of the grey values of Scanco files (AIM, ISQ), and so of the threshold: as stored (native), hu, or mgha (mg HA/cm³).
+    /// hu fails if the file has no calibration; hu-where-known then keeps stored values [default: native, with a warning]
     #[arg(long, value_name = "UNIT", value_parser = words::choice::<GreyUnit>(&["native", "hu", "mgha", "hu-where-known"]))]
     units: Option<GreyUnit>,
     /// Lower threshold (inclusive), in grey values of the image, applied after smoothing
@@ -50,7 +50,7 @@ pub struct SegmentSettings {
     /// Otsu's threshold instead of a window
     #[arg(long, conflicts_with_all = ["lower", "upper"])]
     otsu: bool,
-    /// Of a labelled scan: the values that are bone, comma-separated (100,127), instead of a threshold
+    /// Values that are bone in a labelled scan, comma-separated (100,127); instead of a threshold
     #[arg(long, value_name = "VALUES", value_delimiter = ',', conflicts_with_all = ["lower", "upper", "otsu", "gaussian"])]
     labels: Vec<i32>,
     /// Smooth with a Gaussian of this σ in voxels before the threshold [default: off]
@@ -72,10 +72,11 @@ pub struct SegmentSettings {
     /// Rotate the scan until this points along z: fabric (the longest mean intercept lengths), or X,Y,Z
     #[arg(long, value_name = "fabric|X,Y,Z", value_parser = words::align, allow_negative_numbers = true)]
     align: Option<Align>,
-    /// Of a rotated scan: the box that lies inside the old one, or the whole of it with pore around [default: inside]
+    /// Box of a rotated scan: inside (it lies within the old box), or whole (all of the scan, with pore around it)
+    /// [default: inside]
     #[arg(long, value_name = "BOX", value_parser = words::choice::<AlignBox>(&["inside", "whole"]))]
     align_box: Option<AlignBox>,
-    /// Cut uneven ends flat: to planes with bone in every tile of this width (mm) that holds any
+    /// Cut uneven ends flat: each end is cut back until every tile of this width (mm) that contains bone reaches the plane
     #[arg(long, value_name = "MM", value_parser = words::positive)]
     plane_cut: Option<f64>,
     /// Keep every voxel, not only the largest connected piece
@@ -96,7 +97,7 @@ pub struct SegmentSettings {
 }
 
 impl SegmentSettings {
-    /// What was said here wins over `params`.
+    /// Options that were given override `params`.
     pub fn apply(&self, params: &mut SegmentParams) -> Result<()> {
         if self.otsu {
             (params.otsu, params.lower, params.upper) = (true, None, None);

@@ -27,7 +27,7 @@ pub struct TissueSettings {
 }
 
 impl TissueSettings {
-    /// What was said here wins over `params`.
+    /// Options that were given override `params`.
     pub fn apply(&self, params: &mut SolveParams) -> Result<()> {
         params.young_mpa = self.young_mpa.unwrap_or(params.young_mpa);
         if let Some(law) = &self.material {
@@ -71,7 +71,7 @@ pub struct LatticeSettings {
 }
 
 impl LatticeSettings {
-    /// What was said here wins over `params`.
+    /// Options that were given override `params`.
     pub fn apply(&self, params: &mut LatticeParams) -> Result<()> {
         if !self.structure.is_empty() {
             params.structure = self.structure.clone();

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// Compress a segmented scan and compute its apparent modulus E_app
 ///
-/// Solves every lattice asked for here or by `lattice` before, and writes DIR/results.csv (one row per solve) and
+/// Solves every lattice that is asked for here, or was by `lattice`, and writes DIR/results.csv (one row per solve) and
 /// DIR/results.json (the same with provenance) after each.
 #[derive(Args)]
 pub struct SolveArgs {
@@ -35,7 +35,7 @@ pub struct SolveArgs {
     /// surface), vtu (geometry-fe: the mesh, for ParaView)
     #[arg(long, value_name = "FORMAT", value_parser = ["inp", "stl", "vtu"])]
     export: Option<String>,
-    /// Of an exported model: different moduli at most; more are rounded to the means of as many bins
+    /// Maximum number of different moduli in an exported model; more are rounded to the means of as many bins
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
     bins: u16,
 }
@@ -61,7 +61,7 @@ pub struct SolveSettings {
     grip_mm: Option<f64>,
     /// uniaxial; confined (sides held); stiffness (voxel-fe: all six unit strains, to DIR/stiffness.json); shear-x, -y, -z (the
     /// upper end moves that way by strain times height); bending-x, -y, -z (both ends tilt about that axis by half of
-    /// --angle-deg, opposite ways); torsion (the upper end turns about the long axis by --angle-deg). Shear, bending and
+    /// --angle-deg, in opposite directions); torsion (the upper end turns about the long axis by --angle-deg). Shear, bending and
     /// torsion hold both ends in all components, about the middle of the grid [default: uniaxial]
     #[arg(long, value_parser = words::choice::<Load>(Load::WORDS), hide_possible_values = true)]
     load: Option<Load>,
@@ -118,8 +118,8 @@ pub struct SolveSettings {
     /// both ends and in the middle (DIR/sections.csv)
     #[arg(long)]
     statistics: bool,
-    /// voxel-fe: find the failure load, where 2 % of the bone exceed an effective strain of 0.007 (Pistoia et al. 2002); that of
-    /// 1 to 7 % goes to DIR/failure.csv
+    /// voxel-fe: find the failure load, where 2 % of the bone exceed an effective strain of 0.007 (Pistoia et al. 2002); the failure
+    /// loads at 1 to 7 % go to DIR/failure.csv
     #[arg(long)]
     failure: bool,
     /// Share of the bone in that criterion, as 2% or 0.02
@@ -133,7 +133,7 @@ pub struct SolveSettings {
     /// labels:100=von-mises:68,127=asymmetric:50,75. Writes DIR/curve.csv
     #[arg(long, value_name = "LAW", value_parser = law::plasticity)]
     plasticity: Option<Plasticity>,
-    /// Of --plasticity: even load steps; one that fails is halved [default: 10]
+    /// Number of even load steps with --plasticity; a step that fails is halved [default: 10]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), requires = "plasticity")]
     steps: Option<u16>,
     /// Only the bone of these labels counts in that criterion, comma-separated
@@ -152,7 +152,7 @@ impl SolveSettings {
         self.load.is_some()
     }
 
-    /// What was said here wins over `params`. `by_error`: an error target chooses the voxel elements.
+    /// Options that were given override `params`. `by_error`: an error target chooses the voxel elements.
     ///
     /// # Errors
     /// Settings that do not fit each other, or the error target.
@@ -296,7 +296,7 @@ fn start(args: &SolveArgs, session: &Session) -> SolveParams {
         return SolveParams::default();
     };
     session.say(format!(
-        "note: settings of the run ({}) are taken, options here win: {}",
+        "note: settings of the run ({}) are used; options here override them: {}",
         path.display(),
         run_settings::in_words(&params)
     ));

@@ -50,7 +50,7 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Manifest> {
         return Err(Error::file(
             path,
             format!(
-                "line {line} is not UTF-8 text, as names with accents are where another encoding was chosen"
+                "line {line} is not UTF-8 text (names with accents may have been saved in another encoding)"
             ),
             "save it as UTF-8 (in Excel: Save as, CSV UTF-8; in R: fileEncoding = \"UTF-8\")",
         ));

@@ -149,7 +149,7 @@ impl Run<'_> {
                 own.note(&format!("failed: {e}"));
                 if results::set_aside(&dir) || results::has_old(&dir) {
                     own.warn(format!(
-                        "its results of an earlier run are not of this recipe: they are kept as {}",
+                        "its results are from an earlier run with another recipe: they are kept as {}",
                         dir.join(results::OLD_TABLE).display()
                     ));
                 }

@@ -60,7 +60,7 @@ pub(super) fn pictures(dir: &Path) -> Vec<(String, Vec<u8>)> {
     let picture = |name: &String| {
         let field = name.trim_start_matches("field-").trim_end_matches(".png");
         let caption = format!(
-            "Field {field}, mid-slices of the three planes; colours end where 99 % of the elements do"
+            "Field {field}, mid-slices of the three planes; the colour scale ends at the 99th percentile of the elements"
         );
         Some((caption, std::fs::read(dir.join(name)).ok()?))
     };

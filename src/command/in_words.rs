@@ -6,7 +6,6 @@ use crate::result::cautions::WARNING;
 use crate::result::details::Details;
 use crate::result::notes;
 use crate::result::row::{FailureLoad, Row};
-use crate::result::settings::BoundaryRule;
 
 /// Scan, model, modulus with all of its stated error, cost. Warnings of its note are left out: the terminal has them in lines
 /// of their own.
@@ -18,7 +17,9 @@ pub fn in_words(row: &Row) -> String {
         "{} {:<5} {:<12} {:>7} mm  {} {:>9} sites {:>6} iterations {wall:>7} s{failure}{}",
         row.key.scan,
         row.key.structure.name(),
-        row.key.boundary.map_or("", BoundaryRule::name),
+        row.key
+            .boundary
+            .map_or("", |b| b.method_name(row.key.structure)),
         (row.key.lp_mm * 1e6).round() / 1e6,
         answered(row),
         solved.sites.unwrap_or(0),

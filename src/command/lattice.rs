@@ -91,7 +91,7 @@ pub fn lattice(
     }
     if exports.formats.contains(&Export::Lammps) {
         session.warn(
-            "LAMMPS data hold bonds alone, and a lattice of bonds alone has a Poisson's ratio of 0.25, whatever the tissue's (0.3 by default): compare their results with `solve --poisson 0.25`",
+            "LAMMPS data contain pair bonds only, which fixes Poisson's ratio at 0.25 whatever that of the tissue (0.3 by default): compare their results with `solve --poisson 0.25`",
         );
     }
     let tissue = Tissue::Uniform(Solid {

@@ -477,7 +477,10 @@ fn metered(mut row: Row, meter: &Meter) -> Row {
 /// What a row is solved with, in short.
 fn name(key: &Settings) -> String {
     match key.boundary {
-        Some(boundary) => format!("{} {}", key.structure.name(), boundary.name()),
+        Some(boundary) => {
+            let method = boundary.method_name(key.structure);
+            format!("{} {method}", key.structure.name())
+        }
         None => key.structure.name().to_owned(),
     }
 }

@@ -9,7 +9,7 @@ use image::{Rgb, RgbImage};
 const SIDE: f64 = 360.0;
 const MARGIN: u32 = 14;
 const CAPTION: u32 = 24;
-/// Beside the slices, for the colour bar.
+/// Width next to the slices, for the colour bar.
 const BAR: u32 = 150;
 const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
 /// Where no element is.

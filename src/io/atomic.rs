@@ -67,7 +67,7 @@ fn temporary(dir: &Path) -> std::io::Result<NamedTempFile> {
     loop {
         let mut builder = tempfile::Builder::new();
         let file = builder.prefix(PREFIX).tempfile_in(dir)?;
-        // File systems without locks refuse them to `sweep`, too.
+        // File systems without locks also refuse them to `sweep`.
         if cfg!(unix) {
             let _ = file.as_file().lock();
         }

@@ -34,7 +34,7 @@ pub struct Failure {
     pub factor: f64,
 }
 
-/// Critical volumes of the table that the field prints, besides the one asked for.
+/// Critical volumes of the table that the field prints, in addition to the one asked for.
 pub const TABLE: [f64; 7] = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07];
 
 impl Pistoia {

@@ -35,7 +35,7 @@ pub(super) const STRUCTURE: Column = column(
 pub(super) const BOUNDARY: Column = column(
     "boundary",
     "",
-    "how a lattice meets the bone's surface: floppy, firm, graded; ffb: mean of floppy and firm; extrapolated: limit of several resolutions",
+    "how a lattice meets the bone's surface: floppy, firm, graded (connected on sc, weighted on bcc and fcc); ffb: mean of floppy and firm; extrapolated: limit of several resolutions",
 );
 pub(super) const LP: Column = column(
     "lp_mm",

@@ -16,7 +16,7 @@ use crate::record::detail_columns;
 pub const FILES: [File; 18] = [
     File {
         name: own_files::ANSWERS,
-        about: "one row a scan: its apparent modulus with all of its stated error, by the row of the least stated error",
+        about: "one row for each scan: its apparent modulus with its stated error, from the row with the smallest stated error",
         columns: &ANSWERS,
     },
     File {
@@ -106,7 +106,7 @@ const ANSWERS: [Column; 25] = [
     column(
         "method",
         "",
-        "floppy, firm, ffb, graded, voxel-fe, graded-extrapolated, voxel-fe-extrapolated",
+        "floppy, firm, ffb, graded (connected on sc, weighted on bcc and fcc), voxel-fe, geometry-fe, graded-extrapolated, voxel-fe-extrapolated",
     ),
     column(
         "element_mm",
@@ -173,7 +173,7 @@ const RESULTS: [Column; 62] = [
     column(
         "e_app_mpa",
         "MPa",
-        "the result: from the energy (floppy, graded, voxel-fe), from the stress of the fully coordinated sites (firm)",
+        "the result: from the energy (all but firm), from the stress of the fully coordinated sites (firm)",
     ),
     column(
         "e_app_reaction_mpa",
@@ -193,7 +193,7 @@ const RESULTS: [Column; 62] = [
     column(
         "discretization_error_mpa",
         "MPa",
-        "estimated error of the resolution; of ffb half the gap between floppy and firm, NA where they are shown to be no bracket",
+        "estimated error of the resolution; of ffb half the gap between floppy and firm, NA where the answer was found not to lie between them",
     ),
     column(
         "wall_s",
@@ -246,7 +246,7 @@ const RESULTS: [Column; 62] = [
     column(
         "shape_error_mpa",
         "MPa",
-        "what voxels and the scan's blur leave open about the bone's surface",
+        "uncertainty of the bone's surface, from voxels and the scan's blur",
     ),
     column(
         "error_mpa",

@@ -1,4 +1,4 @@
-//! Owns the data dictionary of the tidy tables beside `results.csv`.
+//! Owns the data dictionary of the tidy tables next to `results.csv`.
 
 use crate::record::column::{
     ANGLE, AXIS, BOUNDARY, Column, ENDS, FAILURE_DISPLACEMENT, FAILURE_FACTOR, FAILURE_LOAD,

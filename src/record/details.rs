@@ -1,4 +1,4 @@
-//! Owns the tidy tables beside `results.csv`: forces at the ends, failure at other volumes, sections, tissue by label. Each line
+//! Owns the tidy tables next to `results.csv`: forces at the ends, failure at other volumes, sections, tissue by label. Each line
 //! says which solve it is of.
 
 use crate::error::Result;

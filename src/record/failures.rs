@@ -6,8 +6,6 @@ use crate::io::table;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Scans of a run that have no results, in its output folder; absent where there are none.
-
 /// A scan of a run that has no results: a line of `failed.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 pub struct Failure {

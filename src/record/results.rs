@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::io::{atomic, own_files, table};
 use crate::machine::host;
 use crate::machine::session::Session;
+use crate::measure::pistoia::Pistoia;
 use crate::pipeline::apparent::SolveParams;
 use crate::record::{details, specimen};
 use crate::result::derived::with_derived;
@@ -27,7 +28,7 @@ const RECORD: &str = "results.json";
 pub const OLD_TABLE: &str = "results.old.csv";
 
 /// Renames `results.csv`, whose rows no longer belong to what else is in the folder, so that nothing takes them for
-/// current; tables beside it go. True if there was one.
+/// current; the tables that belong to it are removed. True if there was one.
 pub fn set_aside(dir: &Path) -> bool {
     details::remove(dir);
     std::fs::rename(dir.join(TABLE), dir.join(OLD_TABLE)).is_ok()
@@ -46,7 +47,7 @@ pub fn set_aside_stale(dir: &Path, session: &Session) {
     let stale = !session.dry_run && old.provenance.mask_blake3 != now.mask_blake3;
     if stale && set_aside(dir) {
         session.say(format!(
-            "{}: the mask is another one: the results of the old one are set aside as {OLD_TABLE}",
+            "{}: the mask has changed: the results of the old mask are set aside as {OLD_TABLE}",
             dir.display()
         ));
     }
@@ -57,6 +58,17 @@ pub fn details(dir: &Path) -> Vec<(Settings, Details)> {
     let rows = Record::read(dir).map_or(Vec::new(), |record| record.rows);
     let of = |keyed: KeyedRow| (keyed.row.key, keyed.details);
     rows.into_iter().map(of).collect()
+}
+
+/// Criteria by which failure loads in `dir` were found, each with the labels whose bone counts.
+pub fn criteria(dir: &Path) -> Vec<(Pistoia, Vec<i32>)> {
+    let rows = Record::read(dir).map_or(Vec::new(), |record| record.rows);
+    let of = |keyed: KeyedRow| {
+        keyed.row.failure()?;
+        let settings = keyed.settings?;
+        Some((settings.pistoia?, settings.failure_labels))
+    };
+    rows.into_iter().filter_map(of).collect()
 }
 
 /// Writes `results.csv`; an older one that was set aside goes.

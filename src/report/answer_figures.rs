@@ -114,7 +114,7 @@ fn against_bv_tv(kept: &[&AnswerLine], caption: &str) -> Option<Figure> {
         stem: "bv-tv".to_owned(),
         title: "Stiffness and bone volume fraction".to_owned(),
         caption: format!(
-            "One point a scan, its answer; bars: all of its stated error, down to 0 at most; dashed: least squares of each group of three scans or more.{caption}"
+            "One point for each scan: its answer; bars: stated error, cut off at 0; dashed: least squares of each group of three scans or more.{caption}"
         ),
         x: Axis::linear("BV/TV"),
         y: Axis::linear("apparent modulus (MPa)"),

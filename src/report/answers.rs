@@ -96,12 +96,12 @@ fn methods_in_words(lines: &[AnswerLine]) -> Vec<String> {
 pub fn method_words(method: &str) -> &str {
     match method {
         "ffb" => "FFB mean",
-        "graded" => "graded lattice",
+        "graded" => "connected or weighted lattice",
         "floppy" => "floppy lattice",
         "firm" => "firm lattice",
         "voxel-fe" => "voxel FE",
         "geometry-fe" => "geometry-based FE",
-        "graded-extrapolated" => "graded lattices, extrapolated",
+        "graded-extrapolated" => "connected or weighted lattices, extrapolated",
         "voxel-fe-extrapolated" => "voxel FE, extrapolated",
         other => other,
     }
@@ -116,16 +116,16 @@ fn explained(method: &str) -> &'static str {
             "a lattice of springs padded by one layer of sites around the bone; too stiff while struts are a few sites thick"
         }
         "ffb" => {
-            "the mean of the floppy lattice (sites in bone only, too soft) and the firm one (padded by a layer, too stiff) of one lattice parameter; ± holds half the gap between them and what the image leaves open about the surface, and is left out where voxel FE or their order shows that they are no bracket"
+            "the mean of the floppy lattice (sites in bone only, too soft) and the firm one (padded by a layer, too stiff) of one lattice parameter; ± includes half the gap between them and the uncertainty of the surface; no error is stated where voxel FE, or the order of the two, shows that the answer does not lie between them"
         }
         "graded" => {
-            "a lattice of springs that goes with the bone in each cell: a site for every connected component (SC), or sites weighted by bone fraction (BCC, FCC); one lattice parameter states no discretisation error"
+            "a lattice of springs with one site for each connected component of bone in a cell (SC), or with sites weighted by bone fraction (BCC, FCC); one lattice parameter states no discretisation error"
         }
         "voxel-fe" => {
-            "hexahedral elements; ± holds what elements of this size and the image leave open about struts of this thickness"
+            "hexahedral elements; ± includes the error of elements of this size and the uncertainty of the surface, for struts of this thickness"
         }
         "geometry-fe" => {
-            "tetrahedra of ten nodes inside the smooth surface of the bone; ± holds what elements of this size and the image leave open about struts of this thickness"
+            "tetrahedra of ten nodes inside the smooth surface of the bone; no error is stated"
         }
         "graded-extrapolated" => {
             "the limit of such lattices (a site for every connected component of bone in a cell, or sites weighted by bone fraction) of several lattice parameters"

@@ -92,8 +92,9 @@ fn against_equal(
         .copied()
         .fold(0.0, f64::max);
     let both = pairs.iter().zip(&places);
-    let mut curves: Vec<Curve> = both.clone().map(|(c, at)| points(c, at)).collect();
-    curves.extend(both.filter_map(|(c, at)| fitted(c, at)));
+    let numbered = both.clone().enumerate();
+    let mut curves: Vec<Curve> = numbered.map(|(i, (c, at))| points(i, c, at)).collect();
+    curves.extend(both.filter_map(|(c, at)| fitted(c.sample.model as usize, at)));
     curves.push(Curve {
         name: "equal".to_owned(),
         hue: 2,
@@ -104,24 +105,25 @@ fn against_equal(
     curves
 }
 
-fn points(c: &Comparison, [x, y]: &[Vec<f64>; 2]) -> Curve {
+/// Methods of one model on several structures have one colour; each comparison has its own marker.
+fn points(number: usize, c: &Comparison, [x, y]: &[Vec<f64>; 2]) -> Curve {
     Curve {
         name: c.sample.method.clone(),
         hue: c.sample.model as usize,
-        shape: c.sample.model as usize,
+        shape: number,
         mark: Mark::Points,
         points: x.iter().zip(y).map(|(x, y)| Point::new(*x, *y)).collect(),
     }
 }
 
-/// The line of least squares in the colour of its points, without a name of its own.
-fn fitted(c: &Comparison, [x, y]: &[Vec<f64>; 2]) -> Option<Curve> {
+/// The line of least squares, without a name of its own.
+fn fitted(hue: usize, [x, y]: &[Vec<f64>; 2]) -> Option<Curve> {
     let line = regression(x, y)?;
     let (low, high) = span(x);
     let at = |x: f64| Point::new(x, line.intercept + line.slope * x);
     Some(Curve {
         name: String::new(),
-        hue: c.sample.model as usize,
+        hue,
         shape: 0,
         mark: Mark::Rule,
         points: vec![at(low), at(high)],
@@ -161,8 +163,12 @@ fn differences(pairs: &[Comparison]) -> Option<Figure> {
 fn differences_over_bv_tv(pairs: &[Comparison]) -> Option<Figure> {
     let first = pairs.first()?;
     let places = |c: &Comparison| [c.bv_tv.clone(), c.differences_percent()];
-    let mut curves: Vec<Curve> = pairs.iter().map(|c| points(c, &places(c))).collect();
-    curves.extend(pairs.iter().filter_map(|c| fitted(c, &places(c))));
+    let numbered = pairs.iter().enumerate();
+    let mut curves: Vec<Curve> = numbered.map(|(i, c)| points(i, c, &places(c))).collect();
+    let lines = pairs
+        .iter()
+        .filter_map(|c| fitted(c.sample.model as usize, &places(c)));
+    curves.extend(lines);
     Some(Figure {
         stem: "differences-over-bv-tv".to_owned(),
         folded: true,
@@ -186,7 +192,7 @@ fn bland_altman(c: &Comparison) -> Figure {
         stem: format!("bland-altman-{}", file_words(method)),
         title: format!("{method} against {reference}"),
         caption: format!(
-            "{method} less {reference} over the mean of both (Bland and Altman), {} scans, with the mean difference and its limits of agreement.",
+            "{method} minus {reference} over the mean of both (Bland and Altman), {} scans, with the mean difference and its limits of agreement.",
             differences.len()
         ),
         y: Axis::linear("difference (MPa)"),
@@ -217,14 +223,15 @@ fn bland_altman_percent(c: &Comparison) -> Figure {
         stem: format!("bland-altman-percent-{}", file_words(method)),
         title: format!("{method} against {reference}, in percent"),
         caption: format!(
-            "{method} less {reference} in percent of the mean of both, {} scans, with the mean difference and its limits of agreement.{tested}",
+            "{method} minus {reference} in percent of the mean of both, {} scans, with the mean difference and its limits of agreement.{tested}",
             differences.len()
         ),
         y: Axis::linear("difference (% of the mean)"),
         ..over_means(c, &differences, limits)
     };
     if let Content::Curves(curves) = &mut figure.content {
-        curves.extend(fitted(c, &[means(c), differences]));
+        // In the colour of the points: limits have another.
+        curves.extend(fitted(0, &[means(c), differences]));
     }
     figure
 }
@@ -314,14 +321,14 @@ mod tests {
             "bland-altman-percent-firm",
             "bland-altman-ffb-mean",
             "bland-altman-percent-ffb-mean",
-            "bland-altman-graded-extrapolated",
-            "bland-altman-percent-graded-extrapolated",
+            "bland-altman-connected-extrapolated",
+            "bland-altman-percent-connected-extrapolated",
         ];
         assert_eq!(stems(&figures), expected);
         let Content::Groups(groups) = &figures[0].content else {
             panic!("methods are side by side");
         };
-        assert_eq!(groups[3].label, "graded, extrapolated (n = 4)");
+        assert_eq!(groups[3].label, "connected, extrapolated (n = 4)");
         let Content::Curves(curves) = &figures[1].content else {
             panic!("curves are curves");
         };
@@ -329,7 +336,7 @@ mod tests {
             let found = curves.iter().find(|c| c.name == name);
             found.map(|c| (c.hue % 7, c.shape % 7))
         };
-        let [graded, ffb] = ["graded, extrapolated", "FFB mean"].map(|n| look(n).unwrap());
+        let [graded, ffb] = ["connected, extrapolated", "FFB mean"].map(|n| look(n).unwrap());
         assert!(graded.0 != ffb.0 && graded.1 != ffb.1, "{graded:?} {ffb:?}");
     }
 }

@@ -53,7 +53,7 @@ fn curves<'a>(
         families
             .iter()
             .map(|f| &f.structure)
-            .filter(|s| !matches!(s, CellType::Hex8 | CellType::Tet10)),
+            .filter(|s| s.is_lattice()),
     );
     let conditions = distinct(families.iter().map(|f| &f.condition));
     let curve = |family: &Family| {
@@ -65,10 +65,10 @@ fn curves<'a>(
                 format!(
                     "{} {}",
                     family.structure.name().to_uppercase(),
-                    family.model.name()
+                    family.model.name_on(family.structure)
                 )
             }
-            _ => family.model.name().to_owned(),
+            _ => family.model.name_on(family.structure).to_owned(),
         };
         if let (true, Some(words)) = (conditions.len() > 1, &family.condition) {
             name = format!("{name}, {words}");
@@ -147,7 +147,7 @@ fn convergence_of(scan: &str, solved: &[SolvedRow]) -> Figure {
         scan: Some(scan.to_owned()),
         title: format!("Convergence of {scan}"),
         caption: format!(
-            "Apparent modulus against lattice parameter (element size for voxel FE). Bars: all of the stated error, down to 0 at most; level lines: limits.{}",
+            "Apparent modulus against lattice parameter (element size for voxel FE). Bars: stated error, cut off at 0; horizontal lines: limits.{}",
             tissue(&found)
         ),
         x: Axis::linear("lattice parameter (mm)"),

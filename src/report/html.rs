@@ -5,6 +5,7 @@ use crate::report::answers;
 use crate::report::cells::{Cell, Table, length, link, number, records, text, time, with_error};
 use crate::report::figure::Figure;
 use crate::report::group_tables;
+use crate::report::methods::Methods;
 use crate::report::plot;
 use crate::report::{Model, Report};
 use base64::Engine;
@@ -72,7 +73,12 @@ struct Picture<'a> {
 }
 
 /// The whole page.
-pub fn render(report: &Report, pages: &[ScanPage], source: &Source) -> Result<String> {
+pub fn render(
+    report: &Report,
+    pages: &[ScanPage],
+    methods: &Methods,
+    source: &Source,
+) -> Result<String> {
     let (own, shared): (Vec<&Figure>, Vec<&Figure>) =
         report.figures.iter().partition(|f| f.scan.is_some());
     let pages: Vec<Page> = pages.iter().map(|page| shown_page(page, &own)).collect();
@@ -104,6 +110,7 @@ pub fn render(report: &Report, pages: &[ScanPage], source: &Source) -> Result<St
         agreements => plain(&records(&statistics.agreements)),
         boxes => plain(&records(&statistics.boxes)),
         pages => plain(&pages),
+        methods => plain(methods),
     };
     let mut environment = Environment::new();
     let template = environment
@@ -208,7 +215,7 @@ mod tests {
     #[test]
     fn a_page_is_about_its_scans_alone() {
         let report = crate::report::report(&[], Default::default(), &[], &Default::default());
-        let page = render(&report, &[], &Source::default()).unwrap();
+        let page = render(&report, &[], &Methods::default(), &Source::default()).unwrap();
         assert!(page.contains("Recipe and provenance"));
         for words in ["cargo ", "reports/", "Validation"] {
             assert!(!page.contains(words), "{words}");

@@ -6,6 +6,7 @@ mod group_tables;
 pub mod groups;
 pub mod html;
 pub mod markdown;
+pub mod methods;
 pub mod plot;
 
 mod answer_figures;
@@ -19,7 +20,7 @@ pub mod table;
 use crate::result::cautions::WARNING;
 use crate::result::notes::{Alike, Alikes, parts};
 use crate::result::row::Row;
-use crate::result::settings::{BoundaryRule, Elements, Method};
+use crate::result::settings::{BoundaryRule, CellType, Elements, Method};
 use crate::result::strength::CurvePoint;
 use answers::Answers;
 use figure::Figure;
@@ -109,7 +110,7 @@ const SERIOUS: [&str; 6] = [
     "not converged",
     "mean of a modulus",
     "no path",
-    "what connects",
+    "only a mechanism",
     "the error asked for",
 ];
 
@@ -191,9 +192,10 @@ pub enum Model {
     Floppy,
     Firm,
     Ffb,
+    /// Connected on SC, weighted on BCC and FCC.
     Graded,
     VoxelFe,
-    /// Limit of graded lattices.
+    /// Limit of connected or weighted lattices.
     GradedLimit,
     /// Limit of voxel FE.
     VoxelFeLimit,
@@ -236,14 +238,26 @@ impl Model {
         matches!(self, Model::GradedLimit | Model::VoxelFeLimit)
     }
 
+    /// Of one structure, whose own name the method has there.
+    pub fn name_on(self, structure: CellType) -> &'static str {
+        match (self, structure.is_simple_cubic()) {
+            (Model::Graded, true) => "connected",
+            (Model::Graded, false) => "weighted",
+            (Model::GradedLimit, true) => "connected, extrapolated",
+            (Model::GradedLimit, false) => "weighted, extrapolated",
+            _ => self.name(),
+        }
+    }
+
+    /// Of all structures together.
     pub fn name(self) -> &'static str {
         [
             "floppy",
             "firm",
             "FFB mean",
-            "graded",
+            "connected or weighted",
             "voxel FE",
-            "graded, extrapolated",
+            "connected or weighted, extrapolated",
             "voxel FE, extrapolated",
             "geometry-based FE",
         ][self as usize]

@@ -12,7 +12,7 @@ use kuva::plot::line::{LinePlot, LineStyle};
 use kuva::plot::scatter::{MarkerShape, ScatterPlot};
 use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
-use kuva::render::render::{Primitive, Scene, render_multiple};
+use kuva::render::render::{Primitive, Scene, collect_legend_entries, render_multiple};
 
 /// Okabe and Ito's palette with a brown for its yellow, which is too pale on paper.
 const HUES: [&str; 8] = [
@@ -135,6 +135,8 @@ fn layout(figure: &Figure, plots: &[Plot]) -> Layout {
         .with_x_label(figure.x.label.clone())
         .with_y_label(figure.y.label.clone())
         .with_legend_position(LegendPosition::OutsideBottomColumns)
+        // Measured names: from their letters alone the crate reserves too few rows.
+        .with_legend_entries(collect_legend_entries(plots))
         .with_legend_box(false)
         .with_font_family("DejaVu Sans, Helvetica, Arial, sans-serif")
         .with_title_size(15)

@@ -122,7 +122,7 @@ fn by_method(rows: &[&Row]) -> Vec<Sample> {
     let lattices = distinct(
         methods
             .iter()
-            .filter(|(_, s)| !matches!(s, CellType::Hex8 | CellType::Tet10))
+            .filter(|(_, s)| s.is_lattice())
             .map(|(_, s)| s),
     )
     .len();
@@ -133,12 +133,12 @@ fn by_method(rows: &[&Row]) -> Vec<Sample> {
             let of_scan = rows.iter().filter(own).filter(|row| row.key.scan == **scan);
             case(of_scan.min_by(|a, b| a.key.lp_mm.total_cmp(&b.key.lp_mm))?)
         };
-        let prefix = match lattices > 1 && !matches!(structure, CellType::Hex8 | CellType::Tet10) {
+        let prefix = match lattices > 1 && structure.is_lattice() {
             true => format!("{} ", structure.name().to_uppercase()),
             false => String::new(),
         };
         Sample {
-            method: format!("{prefix}{}", model.name()),
+            method: format!("{prefix}{}", model.name_on(*structure)),
             model: *model,
             structure: *structure,
             cases: scans.iter().filter_map(finest).collect(),

@@ -109,7 +109,7 @@ fn common(samples: &[Sample]) -> impl Iterator<Item = &Sample> {
     samples.iter().filter(move |s| 2 * s.cases.len() > most)
 }
 
-/// What the others are compared with: of voxel FE and the limits the one of the least stated error, else graded, else FFB.
+/// What the others are compared with: of voxel FE and the limits the one of the least stated error, else connected or weighted lattices, else FFB.
 pub(super) fn reference(samples: &[Sample]) -> Option<&Sample> {
     let of = |model| common(samples).filter(move |s| s.model == model);
     // The first of equals is taken.
@@ -180,7 +180,7 @@ pub fn statistics(samples: &[Sample]) -> Statistics {
     });
     let differences = pairs.iter().filter_map(|c| {
         Some(RegressionLine {
-            y: format!("{}, {}", c.sample.method, c.difference_from()),
+            y: format!("{}: {}", c.sample.method, c.difference_from()),
             x: "BV/TV".to_owned(),
             fit: regression(&c.bv_tv, &c.differences_percent())?,
         })

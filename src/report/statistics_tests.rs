@@ -122,7 +122,7 @@ fn all_are_held_against_an_independent_reference() {
     let line = found
         .regressions
         .iter()
-        .find(|r| r.y == format!("floppy, {percent}"))
+        .find(|r| r.y == format!("floppy: {percent}"))
         .unwrap();
     assert_eq!((line.x.as_str(), line.fit.n), ("BV/TV", 4));
     // Of s1: floppy 10.1, and the limit 1.3 times its coarser 10.2 with 10 more for its bone.
@@ -140,7 +140,7 @@ fn all_are_held_against_an_independent_reference() {
 
 #[test]
 fn two_limits_are_two_methods_and_the_one_of_less_error_is_the_reference() {
-    let (graded, fe) = ("graded, extrapolated", "voxel FE, extrapolated");
+    let (graded, fe) = ("connected, extrapolated", "voxel FE, extrapolated");
     for (of_graded, of_fe, expected) in [(0.05, 0.02, fe), (0.02, 0.05, graded), (0.02, 0.02, fe)] {
         let rows = with_limit(cohort(4), Method::Lattice, of_graded);
         let rows = with_limit(rows, Method::VoxelFe, of_fe);
@@ -188,7 +188,7 @@ fn a_mean_beside_its_parts_is_no_level_of_an_analysis_of_variance() {
     );
     let said = found.analysis_of_variance().unwrap();
     assert!(said.contains("floppy; firm over 4 scans"), "{said}");
-    // Beside one part only it is a level of its own.
+    // With one part only it is a level of its own.
     rows.retain(|row| row.key.boundary != Some(BoundaryRule::Firm));
     assert_eq!(of(&rows).anova_between, ["floppy", "FFB mean"]);
 }

@@ -71,7 +71,7 @@ fn strain(row: &Row) -> Option<String> {
     })
 }
 
-/// Struts thinner than two lattice parameters are one or two sites thick, which graded lattices make up for.
+/// Struts thinner than two lattice parameters are one or two sites thick, which connected and weighted lattices make up for.
 fn coarse(row: &Row) -> Option<String> {
     let plain = matches!(
         row.key.boundary,

@@ -26,8 +26,8 @@ pub enum Tissue {
     Law(String),
 }
 
-/// The program's default, which no study should take for bone's without a thought.
-const DEFAULT_YOUNG_MPA: f64 = 1000.0;
+/// The program's default, a round number: not the modulus of bone tissue.
+pub const DEFAULT_YOUNG_MPA: f64 = 1000.0;
 
 impl Condition {
     pub fn of(key: &Settings) -> Condition {
@@ -98,7 +98,7 @@ impl Condition {
                 rounded(100.0 * self.strain)
             ),
             Motion::Tilt(about) => format!(
-                "Bending about {}: both end planes across {axis} tilt by {}°, opposite ways",
+                "Bending about {}: both end planes across {axis} tilt by {}° in opposite directions",
                 about.name(),
                 rounded(0.5 * angle)
             ),

@@ -1,4 +1,4 @@
-//! Owns what a solve says besides its row: forces at both ends, failure at other volumes, sections, tissue by label. Each
+//! Owns what a solve says in addition to its row: forces at both ends, failure at other volumes, sections, tissue by label. Each
 //! list is a tidy table of its own.
 
 use crate::result::strength::{CurvePoint, YieldedShare};

@@ -11,7 +11,7 @@ use crate::result::row::{Marks, Row, Solution};
 use crate::result::settings::{BoundaryRule, Elements, Load, Method, Settings};
 use crate::result::shape;
 
-/// Order in LP of a graded lattice's error.
+/// Order in LP of the error of connected and weighted lattices.
 const LATTICE_ORDER: f64 = 2.0;
 
 /// Order in element size of voxel FE's error: 1.17 to 1.31 fitted on phantoms over one, two and three elements a voxel.
@@ -28,7 +28,7 @@ const VOXELS_UNSEEN: f64 = 0.25;
 /// misjudges one strut is chance, and a specimen twenty struts wide had half the error of one ten wide.
 const FEW_STRUTS: f64 = 0.9;
 
-/// The rows with one extrapolated row after the last of each series of graded lattices or voxel-FE solves that differ in
+/// The rows with one extrapolated row after the last of each series of connected or weighted lattices or voxel-FE solves that differ in
 /// resolution only. Extrapolated rows already there are replaced.
 pub fn with_extrapolated(rows: &[Row]) -> Vec<Row> {
     let mut all: Vec<Row> = Vec::new();
@@ -157,7 +157,7 @@ fn voxel_limit(levels: &[Level]) -> Option<(f64, f64, String)> {
     let step = (coarse.e_mpa - fine.e_mpa) / (ratio - 1.0);
     let e = fine.e_mpa - step;
     let words = format!(
-        "limit of the voxel staircase, not of the bone, from elements of {:.4} and {:.4} mm, order {VOXEL_ORDER}; {STEP_LEFT} of the step of {:.3} MPa from the finest is left open",
+        "limit of the voxel staircase, not of the bone, from elements of {:.4} and {:.4} mm, order {VOXEL_ORDER}; uncertain by {STEP_LEFT} of the step of {:.3} MPa from the finest",
         coarse.size,
         fine.size,
         step.abs(),
@@ -201,7 +201,8 @@ fn lattice_limit(levels: &[Level], finest: &Row) -> Option<(f64, f64, String)> {
     let struts = FEW_STRUTS * e * thickness / finest.key.tv_mm3.cbrt();
     let sizes: Vec<String> = levels.iter().rev().map(|l| l.size.to_string()).collect();
     let words = format!(
-        "limit of graded lattices at LP {} mm, order 2 in LP ({}); left open: {step:.3} MPa from the finest, scatter {scatter:.3}, voxels {voxels:.3}, few struts {struts:.3}",
+        "limit of {} lattices at LP {} mm, order 2 in LP ({}); parts of the error in MPa: step from the finest {step:.3}, scatter {scatter:.3}, voxels {voxels:.3}, few struts {struts:.3}",
+        BoundaryRule::Graded.method_name(finest.key.structure),
         sizes.join(", "),
         fitted_order(levels).map_or("none could be fitted".into(), |p| format!("fitted {p:.1}")),
     );

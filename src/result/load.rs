@@ -17,7 +17,7 @@ pub enum Load {
     ShearX,
     ShearY,
     ShearZ,
-    /// Both ends tilt about x, opposite ways.
+    /// Both ends tilt about x, in opposite directions.
     BendingX,
     BendingY,
     BendingZ,

@@ -2,7 +2,6 @@
 
 mod columns;
 
-use crate::result::notes;
 use crate::result::settings::Settings;
 use crate::result::strength::Strength;
 use columns::Columns;
@@ -29,7 +28,7 @@ pub struct Solution {
     pub iterations: Option<u64>,
     pub residual: Option<f64>,
     pub converged: Option<bool>,
-    /// The headline: energy for floppy, graded and voxel FE; stress of the fully coordinated sites for firm.
+    /// The headline: energy for all others; stress of the fully coordinated sites for firm.
     pub e_app_mpa: Option<f64>,
     pub e_app_reaction_mpa: Option<f64>,
     pub e_app_stress_mpa: Option<f64>,
@@ -74,6 +73,8 @@ pub struct FailureLoad {
 /// What is known of a row or of its specimen apart from the solve.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Marks {
+    /// The model lost the path that the bone has, or has nothing to measure it by: its modulus of 0 is not the bone's.
+    pub is_no_answer: bool,
     /// What a reader must know of this row (no path between the faces, not converged, ...).
     pub note: Option<String>,
     /// From a manifest.
@@ -153,8 +154,7 @@ impl Row {
 
     /// Whether the model lost the path that the bone has, or has nothing to measure it by: its modulus of 0 is not the bone's.
     pub fn is_no_answer(&self) -> bool {
-        let note = self.marks.note.as_deref();
-        note.is_some_and(|note| note.contains(notes::NO_ANSWER))
+        self.marks.is_no_answer
     }
 }
 

@@ -36,6 +36,14 @@ pub enum CellType {
 }
 
 impl CellType {
+    pub fn is_lattice(self) -> bool {
+        matches!(self, CellType::Lattice(_))
+    }
+
+    pub fn is_simple_cubic(self) -> bool {
+        self == CellType::Lattice(Structure::Sc)
+    }
+
     pub fn name(self) -> &'static str {
         match self {
             CellType::Lattice(structure) => structure.name(),

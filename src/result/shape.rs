@@ -139,7 +139,7 @@ pub const MOST_CONTRAST: f64 = 2.0;
 
 /// Says so in the note of a row.
 pub const INTERFACES: &str =
-    "no error is stated: what voxels leave open at interfaces between unlike tissues is not known";
+    "no error is stated: the error of voxels at interfaces between unlike tissues is not known";
 
 /// The error of one element a voxel whose modulus finer elements, of `of_fine`, put outside its stated `error`; None where they
 /// agree. `moduli`: that of one element a voxel, that of finer ones.

@@ -30,7 +30,7 @@ pub fn bracket_fault(floppy: &Row, firm: &Row, witness: Option<&Row>) -> Option<
     let (low, high) = (floppy.e_app_mpa()?, firm.e_app_mpa()?);
     if high + solver_error(firm) < low - solver_error(floppy) {
         return Some(format!(
-            "firm ({high:.3} MPa) lies below floppy ({low:.3} MPa), so they bracket nothing"
+            "firm ({high:.3} MPa) lies below floppy ({low:.3} MPa), so the answer need not lie between them"
         ));
     }
     let voxels = witness?.e_app_mpa()?;
@@ -39,7 +39,7 @@ pub fn bracket_fault(floppy: &Row, firm: &Row, witness: Option<&Row>) -> Option<
     let above = voxels - open > high + solver_error(firm);
     (below || above).then(|| {
         format!(
-            "voxel FE at one element a voxel ({voxels:.3} MPa) lies outside floppy ({low:.3} MPa) and firm ({high:.3} MPa), so they are no bracket"
+            "voxel FE at one element a voxel ({voxels:.3} MPa) lies outside floppy ({low:.3} MPa) and firm ({high:.3} MPa), so the answer need not lie between them"
         )
     })
 }
@@ -62,7 +62,7 @@ fn limit_fault(limit: &Row, witness: &Row) -> Option<String> {
     let stated = limit.error_mpa()?;
     ((e - voxels).abs() > stated + solver_error(witness)).then(|| {
         format!(
-            "voxel FE at one element a voxel ({voxels:.3} MPa) contradicts this limit of lattices by more than the {stated:.3} MPa left open, as where coarse lattices bridge cracks or lose thin struts"
+            "voxel FE at one element a voxel ({voxels:.3} MPa) contradicts this limit of lattices by more than the stated {stated:.3} MPa, which happens where coarse lattices bridge cracks or lose thin struts"
         )
     })
 }

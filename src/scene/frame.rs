@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// Times at which fields are written, besides the last.
+    /// Times at which fields are written, in addition to the last.
     pub times: Vec<f64>,
     /// Also every so many time units.
     pub every: Option<f64>,

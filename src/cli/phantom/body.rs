@@ -15,7 +15,7 @@ pub struct BodyArgs {
     /// Edge of the cell that repeats; mean distance of a foam's cells; distance of plates from middle to middle
     #[arg(long, value_name = "MM", value_parser = words::positive, requires = "body")]
     cell_mm: Option<f64>,
-    /// Angle between the third axis of the body (the normal of plates) and z [default: any, by the seed]
+    /// Angle between the third axis of the body (the normal of plates) and z [default: from the seed]
     #[arg(long, value_name = "DEGREES", value_parser = words::number, requires = "body", allow_negative_numbers = true)]
     tilt_degrees: Option<f64>,
     /// Direction of that tilt, from x about z [default: 0]

@@ -2,6 +2,7 @@
 
 mod details;
 mod facts;
+mod methods;
 mod stiffness;
 
 use crate::command::stiffness::RECORD;
@@ -23,6 +24,7 @@ use crate::report::answers;
 use crate::report::answers::Answers;
 use crate::report::html;
 use crate::report::html::{ScanPage, Source};
+use crate::report::methods::methods as written;
 use crate::report::{Report, ReportParams, report as assemble};
 use crate::report::{markdown, plot};
 use crate::result::answer::ScanFacts;
@@ -83,6 +85,9 @@ pub fn answers(rows: &[Row], dirs: &[PathBuf], target: Option<f64>) -> Answers {
     })
 }
 
+/// The methods section of a paper, filled in.
+pub const METHODS: &str = "methods.md";
+
 /// What a report is of. `dirs` are searched for what is known of the scans.
 pub struct Sources<'a> {
     pub rows: &'a [Row],
@@ -111,7 +116,9 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
     });
     report.notes.splice(0..0, failed);
     let pages = pages(rows, dirs);
+    let methods = written(&report, &methods::known(&report, dirs, failures.len()));
     let mut files = render(&report, &pages, session)?;
+    files.push((METHODS.to_owned(), methods.markdown().into_bytes()));
     files.extend(stiffness_table(rows, &pages, dirs));
     let source = Source {
         recipe,
@@ -119,7 +126,7 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
         date: host::date(),
         host: host::name(),
     };
-    let page = html::render(&report, &pages, &source)?;
+    let page = html::render(&report, &pages, &methods, &source)?;
     files.push(("report.html".to_owned(), page.into_bytes()));
     let paths: Vec<PathBuf> = files.iter().map(|(name, _)| out.join(name)).collect();
     if session.dry_run {

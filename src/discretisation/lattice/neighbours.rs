@@ -1,6 +1,6 @@
 //! Owns a lattice's neighbour lists in a bit a bond: 11 bytes a site of plump structure, 30 of sheets one site thick.
 //!
-//! Sites are numbered along rows of the grid, and so are their neighbours in the rows beside. From one site to the next
+//! Sites are numbered along rows of the grid, and so are their neighbours in the rows next to them. From one site to the next
 //! in its row, the end of a bond therefore moves on by one where the bond exists, and stays where it does not: a site
 //! stores a bit a bond, and only the first site of a stretch the numbers that its bonds begin with.
 

@@ -117,7 +117,7 @@ impl Frame {
                     let sites = [first_mm[a], first_mm[a] + span];
                     rings_within(radius, bone, sites, step_mm).ok_or_else(|| too_many(lp_mm))?
                 }
-                // A strip narrower than a cell is left over sideways: its bone counts, too.
+                // A strip narrower than a cell is left over sideways: its bone also counts.
                 Boundary::Connected => 1,
                 Boundary::Floppy | Boundary::Weighted => 0,
             };

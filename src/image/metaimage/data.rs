@@ -80,7 +80,7 @@ fn part(header: &Header, layout: &Layout, path: &Path, after: Option<u64>) -> Re
             ADVICE,
         )),
         (true, false) => raw::read_text(&mut source, layout, path, file_bytes),
-        // MetaIO's own decompression takes gzip for zlib, too.
+        // MetaIO's own decompression also takes gzip for zlib.
         (false, true) if source.fill_buf().is_ok_and(|b| b.starts_with(&raw::GZIP)) => {
             raw::read(&mut raw::gunzip(source), layout, path, file_bytes, true)
         }

@@ -223,7 +223,7 @@ fn has(pages: &mut Pages, tag: u16) -> bool {
 fn samples(pages: &mut Pages, path: &Path) -> Result<Samples> {
     let bits = number(pages, Tag::BitsPerSample).unwrap_or(1);
     let format = match number(pages, Tag::SampleFormat).unwrap_or(1) {
-        // Undefined: libtiff takes it as unsigned, too.
+        // Undefined: libtiff also takes it as unsigned.
         4 => 1,
         format => format,
     };

@@ -156,7 +156,7 @@ pub unsafe fn springs<H: Shape, Q: Vec3Lanes>(
     }
 }
 
-/// Springs of a lattice of weighted sites: bond `ij` is worth `½ (w_i + w_j)`. The diagonals carry the half, too.
+/// Springs of a lattice of weighted sites: bond `ij` is worth `½ (w_i + w_j)`. The diagonals also carry the half.
 ///
 /// # Safety
 /// As [`springs`]; `weights` has an entry a site.

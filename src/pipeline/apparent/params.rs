@@ -1,4 +1,4 @@
-//! Owns the settings of a solve: material, load, supports, accuracy, and what is wanted besides the modulus.
+//! Owns the settings of a solve: material, load, supports, accuracy, and what is wanted in addition to the modulus.
 
 use crate::grid::Axis;
 use crate::io::percent;
@@ -63,7 +63,7 @@ pub struct SolveParams {
     /// geometry-fe: edge of the cells that elements are made in, in mm. None: from the struts' thickness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub element_mm: Option<f64>,
-    /// Count mechanisms, too; takes a factorisation.
+    /// Also count mechanisms; takes a factorisation.
     pub mechanisms: bool,
     /// Fields to write.
     pub fields: Vec<Field>,

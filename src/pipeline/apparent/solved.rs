@@ -164,6 +164,7 @@ impl Solved {
         Row {
             solved: Some(solution),
             marks: Marks {
+                is_no_answer: self.no_answer,
                 note: self.all_notes(&blank.key),
                 ..blank.marks
             },
@@ -223,7 +224,7 @@ impl Solved {
             Ended::IterationLimit => Some("not converged: iteration limit reached".into()),
             Ended::Breakdown => Some("not converged: the model is not positive definite".into()),
             Ended::Mechanism => Some(format!(
-                "what connects the loaded faces only turns and shifts: {zero} to rounding"
+                "only a mechanism connects the loaded faces (parts that turn and shift freely): {zero} to rounding"
             )),
             Ended::EnergyTolerance | Ended::ResidualTolerance => None,
         }

@@ -2,7 +2,7 @@
 //!
 //! Where both files say how they lie in the world, places decide, and must agree. Where one of them has directions without a voxel
 //! size, directions decide. Where one has no directions, both were made from the same array: their axes as stored are the same, and
-//! the scan's turn is the other's, too.
+//! the scan's turn is also that of the other.
 
 use crate::error::{Error, Result};
 use crate::format::orient::{self, Affine};

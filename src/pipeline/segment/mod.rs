@@ -133,7 +133,7 @@ pub fn segment_measured<'a>(
     summary.warnings = summary::warnings(&summary);
     if !params.labels.is_empty() && has_more_values_than(MOST_LABELS, &placed.scan) {
         summary.warnings.push(format!(
-            "the image holds more than {MOST_LABELS} values: it looks like a grey scan, of which --labels takes single grey values. Take --lower or --otsu, or the segmentation of the scan"
+            "the image holds more than {MOST_LABELS} values: it looks like a grey scan, where --labels selects single grey values. Take --lower or --otsu, or the segmentation of the scan"
         ));
     }
     if params.has_window() {

@@ -162,7 +162,7 @@ impl SegmentParams {
             return refuse(
                 "segment.labels",
                 format!(
-                    "label {label} cannot be told apart from its neighbours: values are kept in single precision, which rounds integers from {MOST_LABEL} on"
+                    "label {label} cannot be distinguished from its neighbours: values are kept in single precision, which rounds integers from {MOST_LABEL} on"
                 ),
                 "renumber the labels with smaller numbers",
             );

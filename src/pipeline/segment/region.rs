@@ -97,7 +97,7 @@ pub(super) fn inside<'a>(
     }
 }
 
-/// At most four decimals, none in vain.
+/// At most four decimals, without zeros at the end.
 fn rounded(v: f64) -> f64 {
     (v * 1e4).round() / 1e4
 }

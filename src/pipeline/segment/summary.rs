@@ -219,7 +219,7 @@ pub fn refuse_impossible_voxels(spacing_mm: [f64; 3]) -> Result<()> {
     Err(Error::setting(
         "spacing",
         format!(
-            "voxels of {} × {} × {} mm are no scan's of trabecular bone (0.001 to 0.5 mm): volumes would be wrong by more than a thousand times. {slip}",
+            "voxels of {} × {} × {} mm do not fit a scan of trabecular bone (0.001 to 0.5 mm): volumes would be wrong by more than a thousand times. {slip}",
             spacing_mm[0], spacing_mm[1], spacing_mm[2]
         ),
         "give the size in millimetres with --spacing (for example --spacing 0.0195)",

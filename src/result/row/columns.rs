@@ -1,6 +1,7 @@
 //! Owns the columns of `results.csv`, in their order. Missing values are `None` here and `NA` in the file.
 
 use crate::grid::Axis;
+use crate::result::notes::NO_ANSWER;
 use crate::result::row::{FailureLoad, Marks, Row, Solution};
 use crate::result::settings::{
     BoundaryRule, CellType, Elements, Load, Method, Sed, Settings, Supports,
@@ -241,6 +242,11 @@ impl TryFrom<Columns> for Row {
             key,
             solved: (solved != Solution::default()).then_some(solved),
             marks: Marks {
+                // Files hold it as words.
+                is_no_answer: c
+                    .note
+                    .as_deref()
+                    .is_some_and(|note| note.contains(NO_ANSWER)),
                 note: c.note,
                 group: c.group,
                 subject: c.subject,

@@ -58,7 +58,7 @@ const TOLERANCE: f64 = 1e-8;
 
 impl<const D: usize> Window<D> {
     /// Factorises `body` as it is and condenses it onto `chosen` points (none of whose values is held). Returns the
-    /// solution under unit load, too.
+    /// solution under unit load as well.
     pub fn new(
         body: &Body<D>,
         setup: &Setup,
@@ -77,7 +77,7 @@ impl<const D: usize> Window<D> {
             .iter()
             .enumerate()
             .for_each(|(k, &p)| local[p] = k as u32);
-        // Beside held points a crack cannot leave the window: their bonds never break.
+        // Next to held points a crack cannot leave the window: their bonds never break.
         let held_at = |q: usize| (0..D).any(|d| held[q * D + d].is_some());
         let inside = |q: usize| local[q] != OUTSIDE || held_at(q);
         let whole = |&p: &usize| setup.family.of(p).all(|(q, _)| inside(q));

@@ -211,7 +211,7 @@ fn check_name(probes: &[Probe], k: usize) -> Result<()> {
     let name = &probes[k].name;
     let plain = |c: char| c.is_alphanumeric() || "_- ".contains(c);
     let found = match probes[..k].iter().any(|p| p.name == *name) {
-        true => format!("\"{name}\" is the name of an earlier probe, too"),
+        true => format!("\"{name}\" is also the name of an earlier probe"),
         false if name.is_empty() || !name.chars().all(plain) => format!("found \"{name}\""),
         false => return Ok(()),
     };

@@ -20,7 +20,7 @@ const TRUSTED_RESIDUAL: f64 = 1e-4;
 const MOST_SPREAD: f64 = 1e4;
 
 /// Residual, of the start's, above which an estimated error is not trusted where stiffness differs by more than
-/// [`MOST_SPREAD`], times that spread. The residual is mostly the stiff parts' force, beside which the soft parts' vanishes: two
+/// [`MOST_SPREAD`], times that spread. The residual is mostly the force of the stiff parts; that of the soft parts vanishes next to it: two
 /// random phases at a contrast of 1e6 stood still 32 % above their modulus at residuals of 1e-5 to 1e-6.
 const SOFT_RESIDUAL: f64 = 0.1;
 

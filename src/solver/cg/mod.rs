@@ -100,7 +100,7 @@ impl<const D: usize> Functional<D> for NoGoal {
     }
 }
 
-/// Progress, told once an iteration.
+/// Progress, reported once an iteration.
 #[derive(Debug, Clone, Copy)]
 pub struct CgStep {
     pub iteration: usize,

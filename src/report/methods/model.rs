@@ -1,0 +1,233 @@
+//! Owns what a methods section says of models and tissue.
+
+use super::Answered;
+use super::words::{list, scans, setting, settings};
+use crate::discretisation::lattice::stencil::Structure;
+use crate::physics::hex8::element::{FULL_POISSON, MEAN_POISSON};
+use crate::report::{Report, distinct};
+use crate::result::condition::{Condition, Tissue};
+use crate::result::row::Row;
+use crate::result::settings::{BoundaryRule, CellType, Elements, Method};
+
+/// One sentence or more for each kind of model that answers.
+pub fn text(report: &Report, answered: &[Answered]) -> String {
+    let kind = |a: &Answered| {
+        let key = &a.row.key;
+        (key.method, key.structure, key.boundary, key.elements)
+    };
+    let kinds = distinct(answered.iter().map(kind));
+    let mut text = String::new();
+    for k in &kinds {
+        let of: Vec<&Answered> = answered.iter().filter(|a| kind(a) == *k).collect();
+        let rows: Vec<&Row> = of.iter().map(|a| a.row).collect();
+        if kinds.len() > 1 {
+            let names: Vec<&str> = of.iter().map(|a| a.line.scan.as_str()).collect();
+            text += &format!("Of {}: ", scans(&names));
+        }
+        text += &model(report, &rows);
+        text.push(' ');
+    }
+    if rows_of_others(report, answered) {
+        text += "Results of further models are in results.csv; they are not the answers described here.";
+    }
+    text.trim_end().to_owned()
+}
+
+/// Whether rows of the scans stand for other models than those that answer, or lead to them.
+fn rows_of_others(report: &Report, answered: &[Answered]) -> bool {
+    report.rows.iter().any(|row| {
+        let is_own = |a: &Answered| {
+            let (own, key) = (&a.row.key, &row.key);
+            own.method == key.method
+                && own.structure == key.structure
+                && (own.boundary.is_some_and(BoundaryRule::is_derived)
+                    || own.boundary == key.boundary)
+        };
+        answered.iter().any(|a| a.row.key.scan == row.key.scan) && !answered.iter().any(is_own)
+    })
+}
+
+/// The model of rows that differ in scan and size only.
+fn model(report: &Report, rows: &[&Row]) -> String {
+    let key = &rows[0].key;
+    let sizes = settings(rows.iter().map(|row| row.key.lp_mm));
+    match (key.method, key.boundary) {
+        (Method::Lattice, Some(boundary)) => lattice(report, rows, boundary, &sizes),
+        (Method::Lattice, None) => format!("Bone was represented by a lattice of {sizes} mm."),
+        (Method::VoxelFe, boundary) => {
+            let dilatation = integration(rows[0].key.poisson);
+            let limit = match boundary {
+                Some(BoundaryRule::Extrapolated) => {
+                    format!(
+                        " E_app was extrapolated to elements of size zero from {} mm.",
+                        behind(report, rows)
+                    )
+                }
+                _ => String::new(),
+            };
+            format!(
+                "{} The edge of an element was {sizes} mm. {dilatation}{limit}",
+                bricks(key.elements)
+            )
+        }
+        (Method::GeometryFe, _) => format!(
+            "{} The edge of the cells that the elements were made in was {sizes} mm.",
+            tetrahedra(key.elements)
+        ),
+    }
+}
+
+fn integration(poisson: f64) -> &'static str {
+    match poisson {
+        nu if nu <= FULL_POISSON => "Elements were fully integrated.",
+        nu if nu >= MEAN_POISSON => "The dilatation was averaged over each element.",
+        _ => "Elements were a blend of full integration and mean dilatation.",
+    }
+}
+
+fn bricks(elements: Option<Elements>) -> &'static str {
+    match elements {
+        None | Some(Elements::Voxels) => {
+            "Each bone voxel became one eight-node hexahedral element."
+        }
+        Some(Elements::InterpolatedGrey) => {
+            "Grey values were interpolated on a grid finer than the scan's and thresholded again; each cell of bone became one eight-node hexahedral element."
+        }
+        Some(Elements::SmoothedGrey) => {
+            "Grey values were smoothed once more and thresholded again; each bone voxel became one eight-node hexahedral element."
+        }
+        Some(Elements::SplitVoxels) => {
+            "Each bone voxel of the mask was split into equal eight-node hexahedral elements."
+        }
+        Some(Elements::BlockMeans) => {
+            "Blocks of voxels were averaged and thresholded; each block of bone became one eight-node hexahedral element."
+        }
+        Some(Elements::BoneFractions) => {
+            "Each block of voxels became one eight-node hexahedral element, with the modulus of the tissue times its bone fraction."
+        }
+        Some(Elements::SmoothGrey | Elements::SmoothMask) => {
+            "Bone became eight-node hexahedral elements."
+        }
+    }
+}
+
+fn tetrahedra(elements: Option<Elements>) -> &'static str {
+    match elements {
+        Some(Elements::SmoothMask) => {
+            "The surface of bone was that of the smoothed mask; the inside was filled with ten-node tetrahedral elements."
+        }
+        _ => {
+            "The surface of bone was where the interpolated grey values cross the threshold; the inside was filled with ten-node tetrahedral elements."
+        }
+    }
+}
+
+fn lattice(report: &Report, rows: &[&Row], boundary: BoundaryRule, sizes: &str) -> String {
+    let structure = rows[0].key.structure;
+    let name = match structure {
+        CellType::Lattice(Structure::Sc) => "simple cubic",
+        CellType::Lattice(Structure::Bcc) => "body-centred cubic",
+        CellType::Lattice(Structure::Fcc) => "face-centred cubic",
+        CellType::Hex8 | CellType::Tet10 => structure.name(),
+    };
+    let lattices = match boundary {
+        BoundaryRule::Extrapolated => format!("lattice parameters of {} mm", behind(report, rows)),
+        _ => format!("a lattice parameter of {sizes} mm"),
+    };
+    let thickness = rows.iter().filter_map(|row| row.marks.mean_thickness_mm);
+    let thickness: Vec<f64> = thickness.collect();
+    let struts = match super::words::mean_and_range(&thickness, "mm") {
+        Some(words) => format!(" (strut thickness 2 BV/BS: {words})"),
+        None => String::new(),
+    };
+    format!(
+        "Bone was represented by {name} lattices of material points with {lattices}{struts}. Points interact with their first and second neighbours, and their volumetric energy is summed over each shell of neighbours separately (Chen and Liu 2016). {}",
+        rule(boundary, structure)
+    )
+}
+
+fn rule(boundary: BoundaryRule, structure: CellType) -> &'static str {
+    let connected = structure == CellType::Lattice(Structure::Sc);
+    match boundary {
+        BoundaryRule::Floppy => "Points lie in bone only (floppy boundary, Zojaji et al. 2024).",
+        BoundaryRule::Firm => {
+            "Bone was padded by one layer of points, and the modulus follows from the stress of the fully coordinated points (firm boundary, Zojaji et al. 2024)."
+        }
+        BoundaryRule::Ffb => {
+            "The modulus is the mean of that of points in bone only (floppy boundary) and that of bone padded by one layer of points (firm boundary), at one lattice parameter (FFB, Zojaji et al. 2024)."
+        }
+        BoundaryRule::Graded if connected => {
+            "One point represents each connected component of bone in a cell of the lattice (connected boundary)."
+        }
+        BoundaryRule::Graded => {
+            "The energy of a point is weighted by the bone fraction of its cell (weighted boundary)."
+        }
+        BoundaryRule::Extrapolated if connected => {
+            "One point represents each connected component of bone in a cell of the lattice (connected boundary). E_app was extrapolated to a lattice parameter of zero."
+        }
+        BoundaryRule::Extrapolated => {
+            "The energy of a point is weighted by the bone fraction of its cell (weighted boundary). E_app was extrapolated to a lattice parameter of zero."
+        }
+    }
+}
+
+/// Sizes of the solves that a limit follows from.
+fn behind(report: &Report, rows: &[&Row]) -> String {
+    let leads = |row: &&Row| {
+        let alike = |limit: &&Row| {
+            limit.key.without_discretisation() == row.key.without_discretisation()
+                && limit.key.method == row.key.method
+                && limit.key.structure == row.key.structure
+        };
+        let lattice = matches!(row.key.boundary, None | Some(BoundaryRule::Graded));
+        lattice && row.key.elements != Some(Elements::SmoothedGrey) && rows.iter().any(alike)
+    };
+    let sizes = distinct(
+        report
+            .rows
+            .iter()
+            .filter(leads)
+            .map(|row| setting(row.key.lp_mm)),
+    );
+    list(&sizes)
+}
+
+/// The tissue: elastic constants, law, yield.
+pub fn tissue(condition: &Condition, answered: &[Answered]) -> String {
+    let nu = setting(condition.poisson);
+    let mut text = match &condition.tissue {
+        Tissue::Uniform(young) => format!(
+            "Bone tissue was isotropic and linear elastic, with a Young's modulus of {} MPa and a Poisson's ratio of {nu} everywhere.",
+            setting(*young)
+        ),
+        Tissue::Law(law) => format!(
+            "Bone tissue was isotropic and linear elastic; its Young's modulus in MPa followed the law {law} from voxel to voxel, with a Poisson's ratio of {nu} where the law gives none."
+        ),
+    };
+    let yields = distinct(
+        answered
+            .iter()
+            .filter_map(|a| Some((a.row.key.plasticity.clone()?, a.row.key.steps))),
+    );
+    for (law, steps) in yields {
+        text = text.replacen("linear elastic", "elastic up to yield", 1);
+        text += &format!(" It yielded by the law {law} (stresses in MPa).");
+        if let Some(steps) = steps {
+            text += &format!(
+                " The load was applied in {steps} even steps; a step that failed was halved."
+            );
+        }
+    }
+    text
+}
+
+/// What a paper must add on the tissue.
+pub fn source_of(condition: &Condition) -> Option<String> {
+    match &condition.tissue {
+        Tissue::Law(law) => Some(format!("The source of the law {law}, and of the calibration of densities.")),
+        Tissue::Uniform(young) if *young == crate::result::condition::DEFAULT_YOUNG_MPA => Some(
+            "The tissue modulus of 1000 MPa is the program's default, not a measurement: give moduli as a share of it, or solve with a value from the literature.".to_owned(),
+        ),
+        Tissue::Uniform(young) => Some(format!("The source of the tissue modulus of {} MPa.", setting(*young))),
+    }
+}

@@ -106,11 +106,12 @@ pub struct SolveSettings {
     /// Fields to write, comma-separated: displacement (mm), sed (strain energy density, MPa), fraction (bone in an element, weight
     /// of a site), nodal-force (N); of voxel-fe also von-mises (MPa), effective-strain, strain and stress (xx, yy, zz, yz, xz,
     /// xy; engineering shears), principal-strain and principal-stress (values and directions),
-    /// with --plasticity plastic-strain. voxel-fe writes NIfTI on the
-    /// scan's grid and fields.vti for ParaView; a lattice writes fields-LATTICE.vtk, by site [default: none]
+    /// with --plasticity plastic-strain; of geometry-fe displacement, sed, von-mises, effective-strain, strain and stress. Of voxel-fe
+    /// as NIfTI on the scan's grid and fields.vti for ParaView, of a lattice as fields-LATTICE.vtk, by site, of geometry-fe as
+    /// fields-geometry-fe.vtu [default: none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::choice::<Field>(Field::WORDS), hide_possible_values = true)]
     fields: Vec<Field>,
-    /// voxel-fe: the strain energy density of elements, of which effective strains and the failure load follow: centre (of the
+    /// voxel-fe, geometry-fe: the strain energy density of elements, of which effective strains and the failure load follow: centre (of the
     /// strain at the element's centre, as Faim and ParOSol), or mean (energy over volume) [default: centre]
     #[arg(long, value_name = "WHERE", value_parser = words::choice::<Sed>(Sed::WORDS))]
     sed: Option<Sed>,

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::io::atomic;
+use crate::result::answer::found_by::FoundBy;
 use crate::result::answer::{AnswerLine, ScanFacts, best, line};
 use crate::result::condition::{Condition, shared};
 use crate::result::row::Row;
@@ -22,7 +23,7 @@ pub struct Answer {
     /// Relative error asked for.
     pub target: Option<f64>,
     pub met: Option<bool>,
-    pub method: String,
+    pub method: FoundBy,
     pub element_mm: f64,
     pub young_mpa: f64,
     pub poisson: f64,

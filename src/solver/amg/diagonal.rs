@@ -210,11 +210,12 @@ fn each_pair(operator: &impl Coarsen, start: usize, held: &[u8], mut visit: impl
 fn distinct(operator: &impl Coarsen, start: usize, held: &[u8]) -> (Vec<Pair>, Vec<u16>) {
     let mut known: HashMap<[u32; 6], u16> = HashMap::new();
     let (mut kinds, mut of) = (Vec::new(), Vec::with_capacity(held.len()));
-    // Most sites are as the one before.
-    let mut last = None;
+    // Blocks come from few ways in which neighbours exist, so most were inverted a short while ago.
+    let mut recent = vec![None; RECENT];
     operator.each_diagonal(start..start + held.len(), &mut |site, block| {
         let key = (*block, held[site - start]);
-        let kind = match last {
+        let slot = &mut recent[hash(&key)];
+        let kind = match *slot {
             Some((before, kind)) if before == key => kind,
             _ => {
                 let pair = pair(block, key.1);
@@ -224,10 +225,22 @@ fn distinct(operator: &impl Coarsen, start: usize, held: &[u8]) -> (Vec<Pair>, V
                 })
             }
         };
-        last = Some((key, kind));
+        *slot = Some((key, kind));
         of.push(kind);
     });
     (kinds, of)
+}
+
+/// Blocks that a chunk remembers, a power of two.
+const RECENT: usize = 1024;
+
+/// Where a block and what is held of it are remembered.
+fn hash((block, held): &(Block, u8)) -> usize {
+    let start = u64::from(*held) + 1;
+    let all = block.as_flattened().iter().fold(start, |h, v| {
+        (h.rotate_left(5) ^ u64::from(v.to_bits())).wrapping_mul(0x517c_c1b7_2722_0a95)
+    });
+    (all >> (64 - RECENT.trailing_zeros())) as usize
 }
 
 #[cfg(test)]

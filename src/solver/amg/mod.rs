@@ -45,8 +45,8 @@ pub struct AmgParams {
     pub degrees: [usize; 2],
     /// Sites at which a level is factorised instead of coarsened.
     pub coarsest: usize,
-    /// Cycles that solve an assembled level. Two halve the iterations (thin bone to 1e-6: 59 and 28), but with so few the estimate of the
-    /// error was 5.8 times too small on one of 193 hard bodies, a neck across a diagonal.
+    /// Cycles that solve an assembled level. On bricks two halve the iterations (thin bone to 1e-6: 59 and 28), on lattices the
+    /// finest level is what limits them.
     pub cycles: usize,
 }
 

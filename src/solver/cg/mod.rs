@@ -4,7 +4,6 @@ pub mod correction;
 pub mod error;
 pub mod fallback;
 pub mod jacobi;
-pub mod kept;
 pub mod mixed;
 pub mod widened;
 

@@ -143,7 +143,10 @@ impl Discretisation for VoxelModel {
         System {
             operator: &self.bricks,
             coarsen: &self.bricks,
-            multigrid: AmgParams::new(mesh.grid.spacing_mm),
+            multigrid: AmgParams {
+                cycles: 2,
+                ..AmgParams::new(mesh.grid.spacing_mm)
+            },
             goal: None::<NoGoal>,
             held: match loads {
                 LoadSet::Ends => supports::held(mesh, grips, motion, self.params.load),

@@ -92,7 +92,7 @@ impl Recipe {
             ));
         }
         self.solves().iter().try_for_each(|solve| {
-            if self.error.is_some() {
+            if self.error.is_some() && solve.plasticity.is_none() {
                 needs_modulus(solve.load, "error")?;
             }
             solve.check()

@@ -6,3 +6,4 @@ mod closed_forms;
 mod command;
 mod hard;
 mod points;
+mod stated;

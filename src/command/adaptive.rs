@@ -4,6 +4,8 @@
 //! smoother image say of the shape. The best answer so far is kept. Lattices and coarser elements are not tried: a body whose
 //! cracks they bridge looks converged.
 
+mod strength;
+
 use crate::command::answer;
 use crate::command::estimate;
 use crate::command::in_words::in_words;
@@ -37,6 +39,9 @@ pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session
         tolerance: params.tolerance.min(0.1 * target),
         ..params.clone()
     };
+    if params.plasticity.is_some() {
+        return strength::solve_to(dir, target, &params, session);
+    }
     let mut scan = OpenScan::open(dir, &smoothed_again(&params), session.force, session)?;
     if !session.dry_run {
         // Notes of an earlier target.
@@ -182,7 +187,7 @@ impl Climb<'_> {
 
 fn best(rows: &[Row]) -> Option<(&Row, f64)> {
     let converged = rows.iter().filter(|row| row.converged() == Some(true));
-    let stated = converged.filter_map(|row| Some((row, row.error()?)));
+    let stated = converged.filter_map(|row| Some((row, row.answered_error()?)));
     stated.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 

@@ -2,10 +2,11 @@
 
 use crate::draw::{field, map};
 use crate::error::Result;
+use crate::export::tetrahedra::vtu;
 use crate::export::{vti, vtk};
 use crate::format::orient::{self, Turn};
 use crate::image::nifti;
-use crate::pipeline::apparent::fields::{FieldVolume, Place, Recorded, SiteFields};
+use crate::pipeline::apparent::fields::{FieldVolume, MeshFields, Place, Recorded, SiteFields};
 use crate::volume::Volume;
 use std::path::Path;
 
@@ -16,22 +17,25 @@ pub(super) enum Fields {
     OfVoxels(Vec<FieldVolume>, Turn),
     /// Name of the lattice, values of its sites.
     OfSites(String, SiteFields),
+    OfMesh(MeshFields),
 }
 
 impl Fields {
     /// `stem` names a lattice; `axes` lead from the scan's file to the specimen.
     pub(super) fn of(stem: String, mut recorded: Recorded, axes: Turn) -> Fields {
-        match recorded.sites.take() {
-            Some(sites) => Fields::OfSites(stem, sites),
-            None => Fields::OfVoxels(recorded.fields, axes),
+        match (recorded.sites.take(), recorded.mesh.take()) {
+            (Some(sites), _) => Fields::OfSites(stem, sites),
+            (_, Some(mesh)) => Fields::OfMesh(mesh),
+            _ => Fields::OfVoxels(recorded.fields, axes),
         }
     }
 
     /// Of voxels `field-NAME.nii.gz` on the scan's grid each, and all of them in `fields.vti` for ParaView; of sites
-    /// `fields-LATTICE.vtk`.
+    /// `fields-LATTICE.vtk`; of smooth elements `fields-geometry-fe.vtu`.
     pub(super) fn write(&self, dir: &Path) -> Result<()> {
         match self {
             Fields::None => Ok(()),
+            Fields::OfMesh(mesh) => vtu::write_fields(&dir.join("fields-geometry-fe.vtu"), mesh),
             Fields::OfVoxels(fields, axes) => write_voxels(dir, fields, &axes.inverse()),
             Fields::OfSites(name, sites) => {
                 vtk::write_fields(&dir.join(format!("fields-{name}.vtk")), name, sites)

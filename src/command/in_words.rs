@@ -6,15 +6,17 @@ use crate::result::cautions::WARNING;
 use crate::result::details::Details;
 use crate::result::notes;
 use crate::result::row::{FailureLoad, Row};
+use crate::result::strength::Strength;
 
 /// Scan, model, modulus with all of its stated error, cost. Warnings of its note are left out: the terminal has them in lines
 /// of their own.
 pub fn in_words(row: &Row) -> String {
     let solved = row.solved.clone().unwrap_or_default();
     let failure = solved.failure.map_or(String::new(), |f| failure(&f));
+    let strength = strength(&solved.strength);
     let wall = solved.wall_s.map_or("NA".to_owned(), |t| format!("{t:.2}"));
     format!(
-        "{} {:<5} {:<12} {:>7} mm  {} {:>9} sites {:>6} iterations {wall:>7} s{failure}{}",
+        "{} {:<5} {:<12} {:>7} mm  {} {:>9} sites {:>6} iterations {wall:>7} s{failure}{strength}{}",
         row.key.scan,
         row.key.structure.name(),
         row.key
@@ -60,6 +62,17 @@ fn failure(failure: &FailureLoad) -> String {
         (None, Some(moment)) => format!("  failure moment {moment:.3} N mm"),
         (None, None) => String::new(),
     }
+}
+
+/// Yield stress and largest stress, each with its error where it is stated.
+fn strength(s: &Strength) -> String {
+    let of = |name: &str, stress: Option<f64>, error: Option<f64>| match stress {
+        None => String::new(),
+        Some(_) => format!("  {name} {} MPa", with_error(stress, error).text),
+    };
+    let yields = of("yield stress", s.yield_stress_mpa, s.yield_stress_error_mpa);
+    let largest = of("largest stress", s.max_stress_mpa, s.max_stress_error_mpa);
+    format!("{yields}{largest}")
 }
 
 /// What each tissue carries at both ends and in the middle, in a line; None where it was not asked for or there is one tissue.

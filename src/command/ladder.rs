@@ -17,6 +17,9 @@ const MET_BY_VOXELS: f64 = 0.15;
 
 /// What `--error` can be expected to solve, the largest model last.
 pub fn expected(target: f64, params: &SolveParams) -> Vec<SolveParams> {
+    if params.plasticity.is_some() {
+        return vec![split_voxels(params, 1), split_voxels(params, 2)];
+    }
     let mut steps = vec![voxel_fe(params, 1, 1)];
     if target < MET_BY_VOXELS {
         steps.extend([smoothed_again(params), voxel_fe(params, 1, REFINED[0])]);
@@ -31,6 +34,14 @@ pub fn voxel_fe(params: &SolveParams, coarsen: usize, refine: usize) -> SolvePar
         refine,
         refine_mask: false,
         ..params.clone()
+    }
+}
+
+/// Elements that are voxels, or parts of one.
+pub fn split_voxels(params: &SolveParams, refine: usize) -> SolveParams {
+    SolveParams {
+        refine_mask: true,
+        ..voxel_fe(params, 1, refine)
     }
 }
 

@@ -280,7 +280,7 @@ impl OpenScan {
         let (row, details, fields) = match solution {
             JobResult::Modulus(solved, mut recorded) => {
                 let mut row = with_recorded(solved.row(blank.clone()), &recorded);
-                self.state(&mut row);
+                self.state(&mut row, recorded.euler);
                 let stem = format!("{}-{}", name(&blank.key).replace(' ', "-"), blank.key.lp_mm);
                 let details = std::mem::take(&mut recorded.details);
                 let fields = Fields::of(stem, recorded, specimen::axes(&self.dir));
@@ -302,8 +302,8 @@ impl OpenScan {
         })
     }
 
-    /// What one solve by voxel elements states of its error against the body.
-    fn state(&self, row: &mut Row) {
+    /// What one solve by finite elements states of its error against the body; `euler`: numbers of elements and mask.
+    fn state(&self, row: &mut Row, euler: [i64; 2]) {
         let sensitivity = row.solved.as_ref().and_then(|s| s.threshold_sensitivity);
         let voxel_mm = self.specimen.bone.grid.voxel_mm3().cbrt();
         let size = row.key.lp_mm / voxel_mm;
@@ -312,11 +312,13 @@ impl OpenScan {
             notes::add(&mut row.marks.note, shape::INTERFACES);
         } else if let Some(elements) = row.key.elements {
             let surface = self.surface(sensitivity);
-            let stated = shape::of_one_solve(self.image, elements, size, surface);
+            let stated = match elements {
+                Elements::SmoothGrey | Elements::SmoothMask => {
+                    Some(shape::of_smooth(self.image, size, surface, euler))
+                }
+                _ => shape::of_one_solve(self.image, elements, size, surface),
+            };
             shape::state(row, stated);
-            if matches!(elements, Elements::SmoothGrey | Elements::SmoothMask) {
-                notes::add(&mut row.marks.note, shape::SMOOTH);
-            }
         }
     }
 

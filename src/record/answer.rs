@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::io::atomic;
+use crate::result::answer::found_by::FoundBy;
 use crate::result::answer::{AnswerLine, ScanFacts, best, line};
 use crate::result::condition::{Condition, shared};
 use crate::result::row::Row;
@@ -22,7 +23,7 @@ pub struct Answer {
     /// Relative error asked for.
     pub target: Option<f64>,
     pub met: Option<bool>,
-    pub method: String,
+    pub method: FoundBy,
     pub element_mm: f64,
     pub young_mpa: f64,
     pub poisson: f64,
@@ -40,6 +41,15 @@ pub struct Answer {
     pub moment_nmm: Option<f64>,
     #[serde(default)]
     pub failure_moment_nmm: Option<f64>,
+    /// Of tissue that yields.
+    #[serde(default)]
+    pub yield_stress_mpa: Option<f64>,
+    #[serde(default)]
+    pub yield_stress_error_mpa: Option<f64>,
+    #[serde(default)]
+    pub max_stress_mpa: Option<f64>,
+    #[serde(default)]
+    pub max_stress_error_mpa: Option<f64>,
     /// What a reader must know of the number.
     pub note: Option<String>,
     /// Of all rows of the condition together.
@@ -79,6 +89,10 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         angle_deg,
         moment_nmm,
         failure_moment_nmm,
+        yield_stress_mpa,
+        yield_stress_error_mpa,
+        max_stress_mpa,
+        max_stress_error_mpa,
         ..
     } = line(best(own().copied())?, facts);
     let wall_s = own()
@@ -109,6 +123,10 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         angle_deg,
         moment_nmm,
         failure_moment_nmm,
+        yield_stress_mpa,
+        yield_stress_error_mpa,
+        max_stress_mpa,
+        max_stress_error_mpa,
         note,
         wall_s: Some(wall_s.sum()),
     })

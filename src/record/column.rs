@@ -123,3 +123,8 @@ pub(super) const SED: Column = column(
     "strain energy density of elements, of which effective strains and failure follow: centre (of the strain at the centre) or mean (energy over volume)",
 );
 pub(super) const TOLERANCE: Column = column("tolerance", "", "relative algebraic error allowed");
+pub(super) const STEPS: Column = column(
+    "steps",
+    "",
+    "even load steps of plasticity; failed ones are halved",
+);

@@ -7,7 +7,7 @@ use crate::io::own_files;
 use crate::record::column::{
     ANGLE, AXIS, BOUNDARY, BV_TV, ENDS, FAILURE_DISPLACEMENT, FAILURE_FACTOR, FAILURE_LOAD,
     FAILURE_MOMENT, FAILURE_STRAIN, FORCE, GRIP, GROUP, LOAD, LP, METHOD, MOMENT, POISSON, SCAN,
-    SED, STIFFNESS, STRAIN, STRUCTURE, SUBJECT, YOUNG, column,
+    SED, STEPS, STIFFNESS, STRAIN, STRUCTURE, SUBJECT, YOUNG, column,
 };
 pub use crate::record::column::{Column, File};
 use crate::record::detail_columns;
@@ -82,7 +82,7 @@ pub const FILES: [File; 18] = [
     },
 ];
 
-const ANSWERS: [Column; 25] = [
+const ANSWERS: [Column; 28] = [
     SCAN,
     SUBJECT,
     GROUP,
@@ -136,9 +136,12 @@ const ANSWERS: [Column; 25] = [
     ANGLE,
     MOMENT,
     FAILURE_MOMENT,
+    YIELD_ERROR,
+    MAX_STRESS,
+    MAX_ERROR,
 ];
 
-const RESULTS: [Column; 62] = [
+const RESULTS: [Column; 64] = [
     SCAN,
     METHOD,
     STRUCTURE,
@@ -276,28 +279,34 @@ const RESULTS: [Column; 62] = [
         "",
         "law by which tissue yields, as on the command line; NA where it is elastic",
     ),
-    column(
-        "steps",
-        "",
-        "even load steps of plasticity; failed ones are halved",
-    ),
+    STEPS,
     column(
         "yield_stress_mpa",
         "MPa",
         "apparent stress at yield by the 0.2 % offset, a magnitude; NA where the curve ends before",
     ),
     column("yield_strain", "", "nominal strain at yield, a magnitude"),
-    column(
-        "max_stress_mpa",
-        "MPa",
-        "largest apparent stress of the curve, a magnitude",
-    ),
+    MAX_STRESS,
+    YIELD_ERROR,
+    MAX_ERROR,
     column(
         "model_bv_tv",
         "",
         "volume of the model that carries load over TV: cells of sites (connected, weighted: their bone) or elements; bv_tv is the bone's",
     ),
 ];
+
+const MAX_STRESS: Column = column(
+    "max_stress_mpa",
+    "MPa",
+    "largest apparent stress of the curve, a magnitude",
+);
+const YIELD_ERROR: Column = column(
+    "yield_stress_error_mpa",
+    "MPa",
+    "what finer load steps and elements would change of yield_stress_mpa, and what the solver left; where --error asks for it",
+);
+const MAX_ERROR: Column = column("max_stress_error_mpa", "MPa", "the same of max_stress_mpa");
 
 const FAILED: [Column; 3] = [
     SCAN,

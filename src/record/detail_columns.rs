@@ -2,14 +2,14 @@
 
 use crate::record::column::{
     ANGLE, AXIS, BOUNDARY, Column, ENDS, FAILURE_DISPLACEMENT, FAILURE_FACTOR, FAILURE_LOAD,
-    FAILURE_MOMENT, FAILURE_STRAIN, File, GRIP, LOAD, LP, METHOD, POISSON, SCAN, SED, STRAIN,
-    STRUCTURE, TOLERANCE, YOUNG, column,
+    FAILURE_MOMENT, FAILURE_STRAIN, File, GRIP, LOAD, LP, METHOD, POISSON, SCAN, SED, STEPS,
+    STRAIN, STRUCTURE, TOLERANCE, YOUNG, column,
 };
 
 /// Columns that say which solve a line is of.
-const OF: [Column; 15] = [
+const OF: [Column; 16] = [
     SCAN, METHOD, STRUCTURE, BOUNDARY, LP, YOUNG, POISSON, LOAD, ENDS, AXIS, STRAIN, ANGLE, GRIP,
-    TOLERANCE, SED,
+    TOLERANCE, SED, STEPS,
 ];
 
 /// Those, and `own`. `N` is the number of both.
@@ -30,7 +30,7 @@ const fn with<const N: usize>(own: &[Column]) -> [Column; N] {
 pub const REACTIONS: File = File {
     name: "reactions.csv",
     about: "forces and moments that the supports put on both ends, one line an end; signed, along the specimen's axes; off to first order in the solver's error, so solve with --tolerance 1e-8 where they must balance",
-    columns: &with::<25>(&[
+    columns: &with::<26>(&[
         column("end", "", "lower or upper, along the long axis"),
         column("force_x_n", "N", "of the supports on the end"),
         column("force_y_n", "N", "the same along y"),
@@ -62,7 +62,7 @@ const ELEMENTS: Column = column("elements", "", "how many elements");
 pub const FAILURE: File = File {
     name: "failure.csv",
     about: "failure by Pistoia's criterion at several critical volumes, where --failure asks for it",
-    columns: &with::<25>(&[
+    columns: &with::<26>(&[
         column(
             "critical_volume",
             "",
@@ -95,7 +95,7 @@ pub const FAILURE: File = File {
 pub const SECTIONS: File = File {
     name: "sections.csv",
     about: "what each tissue carries through a layer of elements at both ends and in the middle, where --statistics asks for it",
-    columns: &with::<21>(&[
+    columns: &with::<22>(&[
         column("section", "", "lower, middle, upper"),
         LABEL,
         ELEMENTS,
@@ -116,7 +116,7 @@ pub const SECTIONS: File = File {
 pub const YIELDED: File = File {
     name: "yielded.csv",
     about: "what has flowed of each tissue at the end of the load, where --plasticity is given",
-    columns: &with::<20>(&[
+    columns: &with::<21>(&[
         LABEL,
         ELEMENTS,
         column(
@@ -176,7 +176,7 @@ pub const CURVE: File = File {
 pub const TISSUE: File = File {
     name: "tissue.csv",
     about: "how strains and stresses are distributed over the elements of each tissue, where --statistics asks for it",
-    columns: &with::<29>(&[
+    columns: &with::<30>(&[
         LABEL,
         column(
             "quantity",

@@ -44,6 +44,8 @@ struct Of {
     grip_mm: f64,
     tolerance: Option<f64>,
     sed: Option<Sed>,
+    /// Of tissue that yields.
+    steps: Option<u64>,
 }
 
 impl Of {
@@ -64,6 +66,7 @@ impl Of {
             grip_mm: key.grip_mm,
             tolerance: key.tolerance,
             sed: key.sed,
+            steps: key.steps,
         }
     }
 }
@@ -85,7 +88,7 @@ pub fn write<'a>(
 
 /// Removes the tables in `dir`, whose rows are set aside.
 pub fn remove(dir: &Path) {
-    for table in [REACTIONS, FAILURE, SECTIONS, TISSUE, CURVE] {
+    for table in [REACTIONS, FAILURE, SECTIONS, TISSUE, YIELDED, CURVE] {
         let _ = std::fs::remove_file(dir.join(table));
     }
 }

@@ -3,9 +3,11 @@
 use crate::report::cells::{Cell, Table, length, link, number, text, with_error};
 use crate::report::distinct;
 use crate::result::answer;
+use crate::result::answer::found_by::FoundBy;
 use crate::result::answer::{AnswerLine, ScanFacts};
 use crate::result::condition::{Condition, shared};
 use crate::result::row::Row;
+use crate::result::settings::{BoundaryRule, Method};
 use serde::Serialize;
 
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -53,6 +55,8 @@ pub fn answers(rows: &[Row], facts: impl Fn(&str) -> ScanFacts) -> Answers {
     }
     let mut conditions = vec![condition.load_in_words(), condition.tissue_in_words()];
     conditions.extend(failure_in_words(&lines));
+    conditions.extend(laws_in_words(rows));
+    conditions.extend(strength_in_words(&lines));
     conditions.extend(methods_in_words(&lines));
     Answers {
         lines,
@@ -84,56 +88,69 @@ fn failure_in_words(lines: &[AnswerLine]) -> Option<String> {
     })
 }
 
+/// The laws by which tissue yields, as they were given.
+fn laws_in_words(rows: &[Row]) -> Option<String> {
+    let laws = distinct(rows.iter().filter_map(|row| row.key.plasticity.as_deref()));
+    (!laws.is_empty()).then(|| {
+        format!(
+            "Tissue that yields: {} (yield stresses, then hardening, in MPa).",
+            laws.join("; ")
+        )
+    })
+}
+
+/// What the stresses of tissue that yields are, where some does.
+fn strength_in_words(lines: &[AnswerLine]) -> Option<String> {
+    let yields = lines.iter().any(|line| line.max_stress_mpa.is_some());
+    let is_stated = lines.iter().any(|line| line.max_stress_error_mpa.is_some());
+    let error = match is_stated {
+        true => {
+            "the error asked for is theirs, and ± holds what finer load steps and finer elements would change and what the solver left, not what the image leaves open about the bone's surface"
+        }
+        false => "their error is not stated (--error asks for it)",
+    };
+    yields.then(|| {
+        format!(
+            "Yield stress: where the apparent stress-strain curve meets the elastic line shifted by 0.2 % strain; largest stress: of the curve, up to the strain applied. Both are magnitudes; {error}."
+        )
+    })
+}
+
 /// What each method of the answers is, in plain words.
 fn methods_in_words(lines: &[AnswerLine]) -> Vec<String> {
-    distinct(lines.iter().map(|line| line.method.as_str()))
+    distinct(lines.iter().map(|line| line.method))
         .into_iter()
-        .map(|method| format!("{}: {}.", method_words(method), explained(method)))
+        .map(|method| format!("{}: {}.", method.in_words(), explained(method)))
         .collect()
 }
 
-/// How a modulus was found, as a reader says it.
-pub fn method_words(method: &str) -> &str {
-    match method {
-        "ffb" => "FFB mean",
-        "graded" => "connected or weighted lattice",
-        "floppy" => "floppy lattice",
-        "firm" => "firm lattice",
-        "voxel-fe" => "voxel FE",
-        "geometry-fe" => "geometry-based FE",
-        "graded-extrapolated" => "connected or weighted lattices, extrapolated",
-        "voxel-fe-extrapolated" => "voxel FE, extrapolated",
-        other => other,
-    }
-}
-
-fn explained(method: &str) -> &'static str {
-    match method {
-        "floppy" => {
+fn explained(found: FoundBy) -> &'static str {
+    match (found.boundary, found.method) {
+        (Some(BoundaryRule::Floppy), _) => {
             "a lattice of springs whose sites lie in bone only; too soft while struts are a few sites thick"
         }
-        "firm" => {
+        (Some(BoundaryRule::Firm), _) => {
             "a lattice of springs padded by one layer of sites around the bone; too stiff while struts are a few sites thick"
         }
-        "ffb" => {
+        (Some(BoundaryRule::Ffb), _) => {
             "the mean of the floppy lattice (sites in bone only, too soft) and the firm one (padded by a layer, too stiff) of one lattice parameter; ± includes half the gap between them and the uncertainty of the surface; no error is stated where voxel FE, or the order of the two, shows that the answer does not lie between them"
         }
-        "graded" => {
+        (Some(BoundaryRule::Graded), _) => {
             "a lattice of springs with one site for each connected component of bone in a cell (SC), or with sites weighted by bone fraction (BCC, FCC); one lattice parameter states no discretisation error"
         }
-        "voxel-fe" => {
+        (None, Method::VoxelFe) => {
             "hexahedral elements; ± includes the error of elements of this size and the uncertainty of the surface, for struts of this thickness"
         }
-        "geometry-fe" => {
-            "tetrahedra of ten nodes inside the smooth surface of the bone; no error is stated"
+        (None, Method::GeometryFe) => {
+            "tetrahedra of ten nodes inside the smooth surface of the bone; ± includes the error of elements of this size and the uncertainty of the surface"
         }
-        "graded-extrapolated" => {
+        (Some(BoundaryRule::Extrapolated), Method::Lattice) => {
             "the limit of such lattices (a site for every connected component of bone in a cell, or sites weighted by bone fraction) of several lattice parameters"
         }
-        "voxel-fe-extrapolated" => {
+        (Some(BoundaryRule::Extrapolated), _) => {
             "the limit of hexahedral elements of two sizes: that of the voxel staircase, not of the bone; no error is stated"
         }
-        _ => "see the solves",
+        (None, _) => "see the solves",
     }
 }
 
@@ -156,6 +173,7 @@ pub fn table(answers: &Answers) -> Table {
         "failure load (N)",
         "failure moment (N mm)",
         "yield stress (MPa)",
+        "largest stress (MPa)",
     ];
     let body = answers.lines.iter().map(|line| cells(line, answers));
     Table::new(&head, body.collect()).without_empty_columns()
@@ -176,7 +194,7 @@ fn cells(line: &AnswerLine, answers: &Answers) -> Vec<Cell> {
         words(&line.group),
         words(&line.subject),
         number(Some(line.bv_tv)),
-        text(method_words(&line.method)),
+        text(line.method.in_words()),
         length(line.element_mm),
         text(match answers.apart.contains(&line.scan) {
             true => "others (see notes)",
@@ -187,7 +205,8 @@ fn cells(line: &AnswerLine, answers: &Answers) -> Vec<Cell> {
         number(line.moment_nmm),
         number(line.failure_load_n),
         number(line.failure_moment_nmm),
-        number(line.yield_stress_mpa),
+        with_error(line.yield_stress_mpa, line.yield_stress_error_mpa),
+        with_error(line.max_stress_mpa, line.max_stress_error_mpa),
     ]
 }
 
@@ -223,14 +242,14 @@ pub fn comparable(answers: &Answers) -> (Vec<&AnswerLine>, Vec<String>) {
 
 /// Says so where answers that are compared were found in different ways: their errors differ.
 pub fn unlike_methods(kept: &[&AnswerLine]) -> Option<String> {
-    let methods = distinct(kept.iter().map(|line| line.method.as_str()));
-    let of = |method: &str| {
+    let methods = distinct(kept.iter().map(|line| line.method));
+    let of = |method: FoundBy| {
         let scans = kept.iter().filter(|line| line.method == method);
         let scans: Vec<&str> = scans.map(|line| line.scan.as_str()).collect();
-        format!("{}: {}", method_words(method), scans.join(", "))
+        format!("{}: {}", method.in_words(), scans.join(", "))
     };
     (methods.len() > 1).then(|| {
-        let lists: Vec<String> = methods.iter().map(|method| of(method)).collect();
+        let lists: Vec<String> = methods.iter().map(|method| of(*method)).collect();
         format!(
             "the answers were found in different ways ({}): their errors differ, solve all scans in one way before groups are compared",
             lists.join("; ")

@@ -72,8 +72,9 @@ pub fn report(
 ) -> Report {
     let mut figures = answer_figures::figures(&answers);
     let strength = strength.iter();
-    figures
-        .extend(strength.filter_map(|(scan, curve)| curves::strength::stress_strain(scan, curve)));
+    figures.extend(
+        strength.filter_map(|(scan, curve)| curves::strength::stress_strain(scan, curve, rows)),
+    );
     figures.extend(curves::convergence(rows));
     figures.extend(curves::wall_time(rows));
     figures.extend(curves::speed_error(rows));
@@ -105,13 +106,14 @@ pub fn report(
 }
 
 /// How notes begin that a reader must see; others say how a number was found.
-const SERIOUS: [&str; 6] = [
+const SERIOUS: [&str; 7] = [
     WARNING,
     "not converged",
     "mean of a modulus",
     "no path",
     "only a mechanism",
     "the error asked for",
+    "small strains",
 ];
 
 /// Warnings of the answers' notes and of all rows, one line a matter, with the scans that they are of.

@@ -1,5 +1,8 @@
 //! Owns the answer of a scan: of the rows of one condition the one of the least stated error, as a line of `answers.csv`.
 
+pub mod found_by;
+
+use crate::result::answer::found_by::FoundBy;
 use crate::result::condition::Condition;
 use crate::result::notes;
 use crate::result::row::Row;
@@ -20,7 +23,7 @@ pub struct AnswerLine {
     pub error_percent: Option<f64>,
     /// None where no error was asked for.
     pub met: Option<bool>,
-    pub method: String,
+    pub method: FoundBy,
     pub element_mm: f64,
     pub young_mpa: f64,
     pub poisson: f64,
@@ -38,6 +41,10 @@ pub struct AnswerLine {
     pub angle_deg: Option<f64>,
     pub moment_nmm: Option<f64>,
     pub failure_moment_nmm: Option<f64>,
+    /// Of tissue that yields.
+    pub yield_stress_error_mpa: Option<f64>,
+    pub max_stress_mpa: Option<f64>,
+    pub max_stress_error_mpa: Option<f64>,
 }
 
 /// What is known of a scan apart from its rows.
@@ -67,7 +74,7 @@ fn rank(row: &Row) -> (bool, bool, f64, u8, f64) {
     (
         row.carries_nothing(),
         row.converged() == Some(false),
-        row.error().unwrap_or(f64::INFINITY),
+        row.answered_error().unwrap_or(f64::INFINITY),
         exactness,
         row.key.lp_mm,
     )
@@ -87,17 +94,6 @@ pub fn best<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<&'a Row> {
         row.load_carried().is_some() && row.key.elements != Some(Elements::SmoothedGrey)
     };
     rows.into_iter().filter(answers).min_by(order)
-}
-
-/// A word for how a modulus was found.
-pub fn method_name(row: &Row) -> String {
-    let of_voxels = row.key.method == Method::VoxelFe;
-    match row.key.boundary {
-        Some(BoundaryRule::Extrapolated) if of_voxels => "voxel-fe-extrapolated".to_owned(),
-        Some(BoundaryRule::Extrapolated) => "graded-extrapolated".to_owned(),
-        Some(boundary) => boundary.name().to_owned(),
-        None => row.key.method.name().to_owned(),
-    }
 }
 
 /// Force at the strain applied, a magnitude, and stiffness of the specimen between its loaded ends: the row's own, or
@@ -128,6 +124,8 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
     // error is stated and no target met or missed.
     let is_disconnected = row.is_disconnected();
     let relative = row.error().filter(|_| !is_disconnected);
+    let answered = row.answered_error();
+    let strength = row.solved.as_ref().map(|s| s.strength).unwrap_or_default();
     AnswerLine {
         scan: key.scan.clone(),
         subject: row.marks.subject.clone(),
@@ -139,8 +137,8 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         met: facts
             .target
             .filter(|_| !is_disconnected)
-            .map(|target| relative.is_some_and(|e| e <= target)),
-        method: method_name(row),
+            .map(|target| answered.is_some_and(|e| e <= target)),
+        method: FoundBy::of(row),
         element_mm: key.lp_mm,
         young_mpa: key.young_mpa,
         poisson: key.poisson,
@@ -151,10 +149,7 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         stiffness_n_per_mm: forces.map(|[_, k]| k),
         force_n: forces.map(|[f, _]| f),
         failure_load_n: row.failure().and_then(|f| f.load_n),
-        yield_stress_mpa: row
-            .solved
-            .as_ref()
-            .and_then(|s| s.strength.yield_stress_mpa),
+        yield_stress_mpa: strength.yield_stress_mpa,
         threshold_sensitivity: row
             .solved
             .as_ref()
@@ -164,6 +159,9 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         angle_deg: key.angle_deg,
         moment_nmm: row.solved.as_ref().and_then(|s| s.moment_nmm),
         failure_moment_nmm: row.failure().and_then(|f| f.moment_nmm),
+        yield_stress_error_mpa: strength.yield_stress_error_mpa,
+        max_stress_mpa: strength.max_stress_mpa,
+        max_stress_error_mpa: strength.max_stress_error_mpa,
     }
 }
 
@@ -264,12 +262,12 @@ mod tests {
             (Some(50.0), Some(2.0), Some(true))
         );
         assert_eq!(
-            (a.method.as_str(), a.error_percent),
-            ("graded-extrapolated", Some(4.0))
+            (a.method.to_string(), a.error_percent),
+            ("graded-extrapolated".to_owned(), Some(4.0))
         );
         // 4 mm², 1 %, 2 mm.
         assert_eq!((a.force_n, a.stiffness_n_per_mm), (Some(2.0), Some(100.0)));
-        assert_eq!(answer_of(&rows[..3]).method, "voxel-fe");
+        assert_eq!(answer_of(&rows[..3]).method.to_string(), "voxel-fe");
         // No error is stated: none is said.
         let a = answer_of(&rows[..1]);
         assert_eq!(
@@ -282,7 +280,10 @@ mod tests {
     fn what_carries_no_load_answers_only_where_all_rows_do() {
         let broken = row("a", Some(BoundaryRule::Floppy), 0.0, None);
         let graded = row("a", Some(BoundaryRule::Graded), 3.0, None);
-        assert_eq!(answer_of(&[broken.clone(), graded]).method, "graded");
+        assert_eq!(
+            answer_of(&[broken.clone(), graded]).method.to_string(),
+            "graded"
+        );
         let alone = answer_of(&[broken]);
         assert_eq!(
             (alone.e_app_mpa, alone.error_mpa, alone.met),
@@ -295,7 +296,7 @@ mod tests {
         let mut stopped = row("a", None, 50.0, Some(0.1));
         stopped.solved.as_mut().unwrap().converged = Some(false);
         let rows = [stopped, row("a", Some(BoundaryRule::Graded), 40.0, None)];
-        assert_eq!(answer_of(&rows).method, "graded");
+        assert_eq!(answer_of(&rows).method.to_string(), "graded");
     }
 
     #[test]

@@ -14,4 +14,5 @@ pub mod settings;
 pub mod shape;
 pub mod statistics;
 pub mod strength;
+pub mod strength_error;
 pub mod voxel_check;

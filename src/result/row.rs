@@ -128,6 +128,14 @@ impl Row {
         Some(self.error_mpa()? / e_app_mpa).filter(|e| e.is_finite())
     }
 
+    /// The relative error of what the row answers: of the strength where tissue yields, else of the modulus. None where it is not stated.
+    pub fn answered_error(&self) -> Option<f64> {
+        match self.key.plasticity {
+            None => self.error(),
+            Some(_) => self.solved.as_ref()?.strength.error(),
+        }
+    }
+
     /// Whether no bone carries load from face to face: E_app is 0.
     pub fn is_disconnected(&self) -> bool {
         self.carries_nothing() && !self.is_no_answer()

@@ -55,6 +55,21 @@ pub struct Strength {
     pub yield_stress_mpa: Option<f64>,
     pub yield_strain: Option<f64>,
     pub max_stress_mpa: Option<f64>,
+    /// What finer load steps and elements would change and the solver left; None where it was not asked for.
+    pub yield_stress_error_mpa: Option<f64>,
+    pub max_stress_error_mpa: Option<f64>,
+}
+
+impl Strength {
+    /// The larger of the relative errors; None where the error of one of the stresses is not stated.
+    pub fn error(&self) -> Option<f64> {
+        let largest = self.max_stress_error_mpa? / self.max_stress_mpa?;
+        let all = match self.yield_stress_mpa {
+            None => largest,
+            Some(stress) => largest.max(self.yield_stress_error_mpa? / stress),
+        };
+        Some(all).filter(|e| e.is_finite())
+    }
 }
 
 /// Strain by which the line of the elastic modulus is shifted.
@@ -79,6 +94,7 @@ pub fn strength(curve: &[CurvePoint], modulus_mpa: f64) -> Strength {
         yield_strain: at.map(|p| p[0]),
         yield_stress_mpa: at.map(|p| p[1]),
         max_stress_mpa: points[1..].iter().map(|p| p[1]).reduce(f64::max),
+        ..Strength::default()
     }
 }
 

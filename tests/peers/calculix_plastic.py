@@ -98,7 +98,7 @@ def main():
             linear, curved = calculix(base, "linear", text), calculix(base, "quadratic", quadratic(text))
             off = fine / curved - 1
             worst = max(worst, abs(off))
-            print(f"{name:13} voxels {coarse:10.5f} N, split once {fine:10.5f}; CalculiX C3D8 {linear:10.5f}, C3D20R {curved:10.5f}  {off:+.2%}")
+            print(f"{name:13} voxels {coarse:10.5f} N, split once {fine:10.5f}; CalculiX C3D8 {linear:10.5f}, C3D20R {curved:10.5f}  {off:+.2%}", flush=True)
     print(f"largest difference {worst:.2%}")
     if worst > LIMIT:
         sys.exit(f"more than {LIMIT:.0%}")

@@ -6,7 +6,7 @@ use bonepd_ct::image::nifti;
 use bonepd_ct::io::table;
 use bonepd_ct::physics::plasticity::{Plasticity, VonMises, YieldLaw};
 use bonepd_ct::pipeline::apparent::job::JobResult;
-use bonepd_ct::pipeline::apparent::{Method, SolveParams, of_voxels};
+use bonepd_ct::pipeline::apparent::{Load, Method, SolveParams, of_voxels};
 use bonepd_ct::result::row::Row;
 use bonepd_ct::result::strength::CurvePoint;
 use bonepd_ct::volume::Volume;
@@ -188,4 +188,37 @@ fn a_bar_of_voxels_yields_at_its_yield_stress() {
         (strength.yield_stress_mpa.unwrap() / 68.0 - 1.0).abs() < 1e-6,
         "{strength:?}"
     );
+}
+
+/// A shear column turns by up to one and a half times the shear in its middle: of this one about half by more than 0.1 rad.
+#[test]
+fn what_turns_is_said_and_what_does_not_is_not() {
+    let column = specimen([2, 2, 30], [0.02; 3], |_| true);
+    let note = |strain: f64| {
+        let params = SolveParams {
+            method: Method::VoxelFe,
+            load: Load::ShearX,
+            young_mpa: 10_000.0,
+            strain,
+            steps: 2,
+            plasticity: Some(Plasticity::All(YieldLaw::VonMises(VonMises {
+                yield_mpa: 1e5,
+                hardening_mpa: 0.0,
+            }))),
+            ..SolveParams::default()
+        };
+        let solved = of_voxels().solve_specimen(&column, &params, &mut |_, _| ());
+        let (solved, _) = solved.unwrap().modulus().unwrap();
+        solved.row(Row::default()).marks.note.unwrap()
+    };
+    let turned = note(0.09);
+    let before = "small strains do not hold everywhere: ";
+    let after = " % of the bone has turned by more than 0.1 rad";
+    let share = turned
+        .split("; ")
+        .find_map(|part| part.strip_prefix(before)?.strip_suffix(after));
+    let share: f64 = share.expect(&turned).parse().unwrap();
+    // 6 γ s (1 − s) > 0.1 of a beam whose ends do not turn, s along its height.
+    assert!((share - 51.0).abs() < 8.0, "{turned}");
+    assert!(!note(0.03).contains("rad"), "{}", note(0.03));
 }

@@ -22,6 +22,10 @@ pub(super) fn tables(dir: &Path) -> Vec<(String, Table)> {
     let all = results::details(dir);
     let found = [
         (
+            "What has flowed of each tissue at the end of the load",
+            table(&all, |d| &d.yielded),
+        ),
+        (
             "Failure by Pistoia's criterion at several critical volumes",
             table(&all, |d| &d.failure),
         ),

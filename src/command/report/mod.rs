@@ -14,7 +14,7 @@ use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
 use crate::record::collect_rows::CollectedRows;
-use crate::record::details::{FAILURE, REACTIONS, SECTIONS, TISSUE, curve as curve_of};
+use crate::record::details::{FAILURE, REACTIONS, SECTIONS, TISSUE, YIELDED, curve as curve_of};
 use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::specimen;
@@ -283,13 +283,14 @@ fn stiffness_table(
 }
 
 /// Tidy tables of results.
-const TABLES: [&str; 6] = [
+const TABLES: [&str; 7] = [
     "curve.csv",
     "fracture.csv",
     REACTIONS,
     FAILURE,
     SECTIONS,
     TISSUE,
+    YIELDED,
 ];
 
 /// Fields, curves, tables and models that were asked for.

@@ -85,5 +85,6 @@ fn numbered(mut elements: Vec<Corners>, snapped: &Snapped) -> Mesh {
         elements,
         size_mm: snapped.lattice.ends_mm(),
         cell_mm: snapped.lattice.size_mm(),
+        inner_mm: snapped.lattice.inner_mm(),
     }
 }

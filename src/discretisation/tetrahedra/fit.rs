@@ -16,7 +16,7 @@ const MOST: f64 = 0.1;
 /// Part of an element's volume that must be left; its angles must stay within their bounds where they were.
 const LEAST_LEFT: f64 = 0.4;
 
-/// Fits free faces to the surface; those on the faces of the box stay in them.
+/// Fits free faces to the surface; those on planes that elements end at stay in them.
 pub fn fit(mesh: &mut Mesh, surface: &Surface) {
     let faces = Faces::of(&mesh.elements).free;
     let most = MOST * mesh.cell_mm;
@@ -27,7 +27,7 @@ pub fn fit(mesh: &mut Mesh, surface: &Surface) {
             return None;
         }
         let [a, b, c] = corners.map(|v| mesh.vertices_mm[v as usize]);
-        let on = [a, b, c].map(|p| mesh.faces_at(p));
+        let on = [a, b, c].map(|p| mesh.planes_at(p));
         if (0..3).any(|x| on[0][x] & on[1][x] & on[2][x] != 0) {
             return None;
         }
@@ -51,7 +51,7 @@ pub fn fit(mesh: &mut Mesh, surface: &Surface) {
     let before = mesh.vertices_mm.clone();
     let move_of = |(v, sum): (usize, &[f64; 5])| {
         let [x, y, z, size, gaps] = *sum;
-        let on = mesh.faces_at(before[v]);
+        let on = mesh.planes_at(before[v]);
         let normal: [f64; 3] = [x, y, z];
         let whole = dot(normal, normal).sqrt();
         let free: [f64; 3] = std::array::from_fn(|a| if on[a] == 0 { normal[a] } else { 0.0 });
@@ -61,7 +61,11 @@ pub fn fit(mesh: &mut Mesh, surface: &Surface) {
             return [0.0; 3];
         }
         let by = (gaps / size).clamp(-most, most);
-        free.map(|f| by * whole * f / squared)
+        let moved = free.map(|f| by * whole * f / squared);
+        match mesh.is_across_plane(before[v], [0, 1, 2].map(|a| before[v][a] + moved[a])) {
+            true => [0.0; 3],
+            false => moved,
+        }
     };
     let mut moves: Vec<[f64; 3]> = sums.par_iter().enumerate().map(move_of).collect();
     for _ in 0..4 {

@@ -2,6 +2,7 @@
 //!
 //! Places are in half cells: corners are even, centres odd. Tetrahedra stand about the cells' faces: two centres and an edge of
 //! the face. At the box's faces half an octahedron is left, of one centre and the face, in two tetrahedra.
+//! Planes across the box can be kept free of elements that reach through them, as its faces are: grips end there.
 
 /// A vertex in half cells.
 pub type Place = [u32; 3];
@@ -23,6 +24,8 @@ pub struct Lattice {
     /// Cells along each axis.
     pub n: [usize; 3],
     planes_mm: [Vec<f64>; 3],
+    /// Planes that no element reaches through: axis and place along it.
+    inner: Vec<(usize, u32)>,
 }
 
 /// Planes through all the `stops`, ascending, about `size` apart.
@@ -45,7 +48,32 @@ impl Lattice {
     pub fn new(planes_mm: [Vec<f64>; 3]) -> Lattice {
         assert!(planes_mm.iter().all(|p| p.len() > 1), "no cell");
         let n = std::array::from_fn(|a| planes_mm[a].len() - 1);
-        Lattice { n, planes_mm }
+        Lattice {
+            n,
+            planes_mm,
+            inner: Vec::new(),
+        }
+    }
+
+    /// The same with the planes across `axis` at the places `at_mm`, which are planes of it, kept free of elements that reach through them.
+    pub fn ending_at(mut self, axis: usize, at_mm: &[f64]) -> Lattice {
+        let planes = &self.planes_mm[axis];
+        let rounding = 1e-9 * self.ends_mm()[axis];
+        let is_at = |p: f64| at_mm.iter().any(|at| (p - at).abs() < rounding);
+        let inside = (1..self.n[axis]).filter(|p| is_at(planes[*p]));
+        self.inner = inside.map(|p| (axis, 2 * p as u32)).collect();
+        self
+    }
+
+    /// The inner planes that no element reaches through: axis and place in mm.
+    pub fn inner_mm(&self) -> Vec<(usize, f64)> {
+        let place = |&(a, p): &(usize, u32)| (a, self.planes_mm[a][p as usize / 2]);
+        self.inner.iter().map(place).collect()
+    }
+
+    /// Whether elements end at a plane across `axis`.
+    fn is_flat(&self, axis: usize, place: u32) -> bool {
+        place == 0 || place as usize == 2 * self.n[axis] || self.inner.contains(&(axis, place))
     }
 
     fn corners(&self) -> usize {
@@ -90,9 +118,9 @@ impl Lattice {
         std::array::from_fn(|a| self.planes_mm[a][self.n[a]])
     }
 
-    /// Whether a vertex lies on a face of the box, by axis.
+    /// Whether a vertex lies on a plane that elements end at, by axis: a face of the box among them.
     pub fn on_faces(&self, place: Place) -> [bool; 3] {
-        std::array::from_fn(|a| place[a] == 0 || place[a] as usize == 2 * self.n[a])
+        std::array::from_fn(|a| self.is_flat(a, place[a]))
     }
 
     /// The mean edge of the cells.
@@ -125,7 +153,10 @@ impl Lattice {
         let moved = |steps: [(usize, i64); 2]| {
             let mut to = place;
             steps.iter().for_each(|&(a, step)| to[a] += step);
-            inside(to)
+            let through = place[0] % 2 == 1
+                && (steps.iter())
+                    .any(|&(a, step)| step != 0 && self.is_flat(a, (place[a] + step / 2) as u32));
+            inside(to).filter(|_| !through)
         };
         for (a, step) in [(0, 2), (0, -2), (1, 2), (1, -2), (2, 2), (2, -2)] {
             moved([(a, step), (a, 0)]).into_iter().for_each(&mut visit);
@@ -175,17 +206,21 @@ impl Lattice {
             c[axis] = if above { c[axis] + 1 } else { c[axis] - 1 };
             c
         };
-        if at[axis] > 0 && at[axis] < self.n[axis] {
+        if !self.is_flat(axis, low[axis]) {
             for e in 0..4 {
                 visit([centre(false), centre(true), ring[e], ring[(e + 1) % 4]]);
             }
             return;
         }
-        let centre = centre(at[axis] == 0);
         let first = usize::from(!Lattice::ends_diagonals(ring[0], axis));
         let corner = |e: usize| ring[(first + e) % 4];
-        visit([centre, corner(0), corner(1), corner(2)]);
-        visit([centre, corner(0), corner(2), corner(3)]);
+        for above in [false, true] {
+            if at[axis] == if above { self.n[axis] } else { 0 } {
+                continue;
+            }
+            visit([centre(above), corner(0), corner(1), corner(2)]);
+            visit([centre(above), corner(0), corner(2), corner(3)]);
+        }
     }
 
     pub fn edge_kind(a: Place, b: Place) -> EdgeKind {

@@ -16,6 +16,8 @@ pub struct Mesh {
     pub size_mm: [f64; 3],
     /// Mean edge of the lattice's cells.
     pub cell_mm: f64,
+    /// Planes inside the box that no element reaches through: axis and place.
+    pub inner_mm: Vec<(usize, f64)>,
 }
 
 impl Mesh {
@@ -46,6 +48,22 @@ impl Mesh {
     /// See [`faces_at`].
     pub fn faces_at(&self, at: [f64; 3]) -> [u8; 3] {
         faces_at(self.size_mm, at)
+    }
+
+    /// The same; 4 on a plane inside the box that no element reaches through.
+    pub fn planes_at(&self, at: [f64; 3]) -> [u8; 3] {
+        let mut on = self.faces_at(at);
+        for (a, plane) in &self.inner_mm {
+            on[*a] |= u8::from((at[*a] - plane).abs() < 1e-9 * self.size_mm[*a]) << 2;
+        }
+        on
+    }
+
+    /// Whether a face of the box or a plane of `inner_mm` lies between two places, or at the second one only.
+    pub fn is_across_plane(&self, from: [f64; 3], to: [f64; 3]) -> bool {
+        let faces = (0..3).flat_map(|a| [(a, 0.0), (a, self.size_mm[a])]);
+        let mut planes = faces.chain(self.inner_mm.iter().copied());
+        planes.any(|(a, plane)| from[a] != to[a] && (from[a] - plane) * (to[a] - plane) <= 0.0)
     }
 
     /// The same mesh of the elements that `keep` names, without vertices that none uses.

@@ -78,10 +78,10 @@ fn root(parent: &mut [u32], mut e: u32) -> u32 {
 }
 
 /// Which elements a load reaches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Keep {
-    /// Pieces that touch both faces across an axis.
-    Between(usize),
+    /// Pieces that two grips hold, which end at these places along an axis.
+    Between { axis: usize, ends_mm: [f64; 2] },
     /// Pieces that touch a face of the box.
     AtFaces,
 }
@@ -100,19 +100,8 @@ pub fn keep(mesh: &mut Mesh, keep: Keep) -> Loaded {
     let faces = Faces::of(&mesh.elements);
     let (piece, count) = pieces(mesh.elements.len(), &faces.shared);
     let mut touched = vec![0u8; count];
-    for face in &faces.free {
-        let corners = Faces::corners(mesh, *face);
-        let on = corners.map(|v| mesh.faces_at(mesh.vertices_mm[v as usize]));
-        for a in 0..3 {
-            // All three corners: bone that meets a face in an edge is not held there.
-            let all = on.iter().fold(3, |all, v| all & v[a]);
-            let bits = match keep {
-                Keep::Between(axis) if a == axis => all,
-                Keep::Between(_) => 0,
-                Keep::AtFaces => 3 * u8::from(all != 0),
-            };
-            touched[piece[*face as usize / 4] as usize] |= bits;
-        }
+    for (e, corners) in mesh.elements.iter().enumerate() {
+        touched[piece[e] as usize] |= held(mesh, corners, keep);
     }
     let before = mesh.elements.len();
     mesh.retain(|e| touched[piece[e] as usize] == 3);
@@ -120,5 +109,23 @@ pub fn keep(mesh: &mut Mesh, keep: Keep) -> Loaded {
         pieces: count,
         kept: touched.iter().filter(|t| **t == 3).count(),
         dropped_elements: before - mesh.elements.len(),
+    }
+}
+
+/// Which supports hold an element by a face of it: bits of the lower and the upper one. Bone that meets them in an edge is not held.
+fn held(mesh: &Mesh, corners: &Corners, keep: Keep) -> u8 {
+    let at = corners.map(|v| mesh.vertices_mm[v as usize]);
+    let face = |is_on: &dyn Fn(&[f64; 3]) -> bool| at.iter().filter(|p| is_on(p)).count() > 2;
+    match keep {
+        Keep::Between { axis, ends_mm } => {
+            let near = 1e-9 * mesh.size_mm[axis];
+            let lower = face(&|p| p[axis] <= ends_mm[0] + near);
+            let upper = face(&|p| p[axis] >= ends_mm[1] - near);
+            u8::from(lower) | u8::from(upper) << 1
+        }
+        Keep::AtFaces => {
+            let on = |a: usize, bit: u8| face(&|p| mesh.faces_at(*p)[a] & bit != 0);
+            3 * u8::from((0..3).any(|a| on(a, 1) || on(a, 2)))
+        }
     }
 }

@@ -49,7 +49,9 @@ const NEAR_FACE: f64 = 0.32;
 
 fn is_near_face(mesh: &Mesh, at: &[f64; 3]) -> bool {
     let near = NEAR_FACE * mesh.cell_mm;
+    let mut inner = mesh.inner_mm.iter();
     (0..3).any(|a| at[a] < near || at[a] > mesh.size_mm[a] - near)
+        || inner.any(|(a, plane)| (at[*a] - plane).abs() < near)
 }
 
 /// Whether an angle is outside [`BOUNDS_DEGREES`].

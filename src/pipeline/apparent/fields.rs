@@ -1,7 +1,8 @@
 //! Owns what of a solved model is kept on request: of voxel elements fields on the scan's grid, and the failure load; of a
-//! lattice values at its sites.
+//! lattice values at its sites; of smooth elements values of their nodes and middles.
 
 use crate::discretisation::lattice::placement::Frame;
+use crate::discretisation::tetrahedra::nodes::Ten;
 use crate::measure::surface_energy::SurfaceEnergy;
 use crate::result::details::{Details, FailureAt};
 use crate::solver::cg::CgInfo;
@@ -110,9 +111,41 @@ pub struct Recorded {
     pub surface: Option<SurfaceEnergy>,
     /// What a reader must know of the model.
     pub note: Option<String>,
+    /// Euler numbers of smooth elements and of the mask; equal where they are not compared.
+    pub euler: [i64; 2],
     /// At the sites of a lattice.
     pub sites: Option<SiteFields>,
+    /// At the nodes and in the middles of smooth elements.
+    pub mesh: Option<MeshFields>,
     pub details: Details,
+}
+
+/// Fields of ten-node elements.
+#[derive(Debug, Clone)]
+pub struct MeshFields {
+    pub nodes_mm: Vec<[f64; 3]>,
+    pub elements: Vec<Ten>,
+    pub of_nodes: Vec<MeshArray>,
+    pub of_elements: Vec<MeshArray>,
+}
+
+/// One field of a mesh: `components` values a node or element.
+#[derive(Debug, Clone)]
+pub struct MeshArray {
+    /// With the unit, as `sed_mpa`.
+    pub name: &'static str,
+    pub components: usize,
+    pub values: Vec<f32>,
+}
+
+impl MeshArray {
+    pub fn new(name: &'static str, components: usize, values: Vec<f32>) -> MeshArray {
+        MeshArray {
+            name,
+            components,
+            values,
+        }
+    }
 }
 
 /// Fields of a lattice, by site.

@@ -121,7 +121,7 @@ impl SolveParams {
             tolerance: Some(self.tolerance),
             plasticity: self.plasticity.as_ref().map(Plasticity::words),
             steps: self.plasticity.as_ref().map(|_| self.steps as u64),
-            sed: (self.method == Method::VoxelFe && self.load != Load::Stiffness)
+            sed: (self.method != Method::Lattice && self.load != Load::Stiffness)
                 .then_some(self.sed),
             ..Settings::default()
         }

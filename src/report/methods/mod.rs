@@ -12,7 +12,8 @@ mod words;
 
 use crate::measure::pistoia::Pistoia;
 use crate::report::Report;
-use crate::result::answer::{AnswerLine, method_name};
+use crate::result::answer::AnswerLine;
+use crate::result::answer::found_by::FoundBy;
 use crate::result::condition::{Condition, shared};
 use crate::result::row::Row;
 use serde::Serialize;
@@ -149,7 +150,7 @@ fn answered<'a>(report: &'a Report, condition: &Condition) -> Vec<Answered<'a>> 
         let row = report.rows.iter().rfind(|row| {
             row.key.scan == line.scan
                 && Condition::of(&row.key) == *condition
-                && method_name(row) == line.method
+                && FoundBy::of(row) == line.method
                 && row.key.lp_mm == line.element_mm
                 && row.e_app_mpa() == line.e_app_mpa
         })?;

@@ -95,6 +95,10 @@ pub(super) struct Columns {
     #[serde(default)]
     max_stress_mpa: Option<f64>,
     #[serde(default)]
+    yield_stress_error_mpa: Option<f64>,
+    #[serde(default)]
+    max_stress_error_mpa: Option<f64>,
+    #[serde(default)]
     model_bv_tv: Option<f64>,
 }
 
@@ -165,6 +169,8 @@ impl From<Row> for Columns {
             yield_stress_mpa: solved.strength.yield_stress_mpa,
             yield_strain: solved.strength.yield_strain,
             max_stress_mpa: solved.strength.max_stress_mpa,
+            yield_stress_error_mpa: solved.strength.yield_stress_error_mpa,
+            max_stress_error_mpa: solved.strength.max_stress_error_mpa,
             model_bv_tv: solved.model_bv_tv,
         }
     }
@@ -229,6 +235,8 @@ impl TryFrom<Columns> for Row {
                 yield_stress_mpa: c.yield_stress_mpa,
                 yield_strain: c.yield_strain,
                 max_stress_mpa: c.max_stress_mpa,
+                yield_stress_error_mpa: c.yield_stress_error_mpa,
+                max_stress_error_mpa: c.max_stress_error_mpa,
             },
             failure: c.failure_factor.map(|factor| FailureLoad {
                 factor,

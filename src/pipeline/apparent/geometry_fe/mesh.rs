@@ -37,7 +37,8 @@ pub fn of(
 ) -> Result<(TetMesh, Report)> {
     let size_mm = size::of(specimen, params);
     let planes = surface::planes_mm(&specimen.bone.grid, size_mm, grips.axis, grips.low_mm);
-    let lattice = Lattice::new(planes);
+    let ends_mm = [grips.low_mm, grips.high_mm];
+    let lattice = Lattice::new(planes).ending_at(grips.axis, &ends_mm);
     let mut all = fill(surface, &lattice)?;
     let quality = quality::quality(&all);
     if quality.least_degrees <= 0.0 {
@@ -49,7 +50,10 @@ pub fn of(
     let euler = [quality::euler(&all), morphometry::euler(&specimen.bone)];
     let keep = match params.load.motion() {
         None => Keep::AtFaces,
-        Some(_) => Keep::Between(grips.axis),
+        Some(_) => Keep::Between {
+            axis: grips.axis,
+            ends_mm,
+        },
     };
     let loaded = pieces::keep(&mut all, keep);
     let report = Report {

@@ -2,6 +2,7 @@
 
 mod cost;
 mod mesh;
+mod record;
 mod sensitivity;
 mod size;
 mod supports;
@@ -22,11 +23,13 @@ use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::tissue::Tissue;
+use crate::result::details::{Details, FailureAt};
 use crate::result::settings::{CellType, Elements, Method, Settings};
 use crate::solver::amg::AmgParams;
 use crate::solver::cg::NoGoal;
 use crate::volume::Specimen;
 use mesh::Report;
+use record::Recorder;
 use supports::Grips;
 
 /// Smooth elements between grips, or joined to the faces where unit strains are the load.
@@ -214,14 +217,30 @@ impl Discretisation for GeometryModel {
     fn fields(
         &self,
         _: Prepared,
-        _: &SolveParams,
+        params: &SolveParams,
         solved: &Equilibrated,
-        _: &EndWork,
+        work: &EndWork,
     ) -> Result<Recorded> {
         let (model, surface) = (&self.model, &self.surface);
+        let recorder = Recorder {
+            model: self,
+            params,
+            solved,
+            work,
+        };
+        let table = recorder.failures();
+        let criterion = params.pistoia.map(|p| p.critical_volume);
+        let own = |f: &&FailureAt| criterion == Some(f.critical_volume);
         Ok(Recorded {
             surface: sensitivity::of(model, surface, self.is_of_grey, solved.u),
             note: Some(self.report.words(self.is_of_grey)),
+            euler: self.report.euler,
+            mesh: recorder.fields(),
+            failure: table.iter().find(own).cloned(),
+            details: Details {
+                failure: table,
+                ..Details::default()
+            },
             ..Recorded::default()
         })
     }
@@ -243,21 +262,10 @@ fn refuse_settings(tissue: &Tissue, params: &SolveParams) -> Result<()> {
             "give their size: --element-mm MM",
         ));
     }
-    if params.grip_mm > 0.0 && params.load.motion().is_some() {
-        return refused(
-            "grip_mm",
-            "geometry-fe holds end planes only: a gripped block came out 1.5 % too soft",
-        );
-    }
     if params.mechanisms {
         return refused("mechanisms", "geometry-fe counts no mechanisms");
     }
-    if !params.fields.is_empty() || params.pistoia.is_some() || params.statistics {
-        return refused(
-            "fields",
-            "geometry-fe writes no fields, finds no failure load and has no statistics of tissue",
-        );
-    }
+    record::check(params)?;
     match tissue {
         Tissue::Mixed(mixed) if mixed.poissons.len() > 1 => refused(
             "material",

@@ -1,4 +1,4 @@
-//! Owns failure of solved voxel elements by Pistoia's criterion: the load, the displacement and the strain at which it comes.
+//! Owns failure of solved elements by Pistoia's criterion: the load, the displacement and the strain at which it comes.
 
 use crate::measure::apparent::EndWork;
 use crate::measure::pistoia::Failure;

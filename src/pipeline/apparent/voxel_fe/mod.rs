@@ -2,7 +2,7 @@
 
 pub mod bricks;
 pub mod cost;
-mod failure;
+pub mod failure;
 mod labels;
 pub mod plastic;
 mod principal;

@@ -81,7 +81,9 @@ impl<'a> Recorder<'a> {
                 .then(|| self.surface())
                 .flatten(),
             note: None,
+            euler: [0; 2],
             sites: None,
+            mesh: None,
             details: Details {
                 failure: table,
                 ..self.statistics()

@@ -43,7 +43,7 @@ impl VoxelModel {
         }
         if turned > WORTH_A_WORD {
             said.push(format!(
-                "{:.1} % of the bone has turned by more than {LARGE_TURN} rad: small strains no longer hold there",
+                "small strains do not hold everywhere: {:.1} % of the bone has turned by more than {LARGE_TURN} rad",
                 100.0 * turned
             ));
         }

@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+"""Geometry-based FE against bodies of known modulus: how far it is off, what it states, whether that holds.
+
+    python3 tests/bench/geometry_fe.py target/release/bonepd-ct   # about two minutes a body on one core
+    ... --bodies 8,10,15    # these lines of tests/bench/truth_set.csv, from 0
+    ... --draw              # only the tables, from reports/geometry-fe.csv
+
+Bodies and truths are those of truth_set.py (reports/references.csv), each seen in three scans: clean, real (blurred, noisy) and mask. The constants
+of the stated error were set on half A; half B was not looked at for them. Writes reports/geometry-fe.csv (one row a body and scan) and the
+tables of reports/geometry-fe.md.
+"""
+
+import argparse, csv, json, pathlib, re, statistics, tempfile
+
+import truth_set
+from truth_set import Bench, bodies, number, off, read, rms, rows_of, segmented, table, well_known, within
+
+ROWS = truth_set.REPORTS / "geometry-fe.csv"
+PAGE = truth_set.REPORTS / "geometry-fe.md"
+HEAD = ["body", "half", "scan", "element_mm", "e_app_mpa", "error_mpa", "threshold_sensitivity", "thickness_mm", "seconds"]
+
+
+def measure(program, chosen):
+    with open(ROWS, "w", newline="") as file, tempfile.TemporaryDirectory() as work:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(HEAD)
+        bench = Bench(program, work)
+        for body in chosen:
+            for scan in truth_set.SCANS:
+                folder = segmented(bench, body, scan)
+                thickness = json.loads((folder / "segment.json").read_text())["results"]["mean_thickness_mm"]
+                bench.call("solve", folder, "--method", "geometry-fe")
+                row = rows_of(folder)[-1]
+                values = [row["lp_mm"], row["e_app_mpa"], row["error_mpa"], row["threshold_sensitivity"], thickness, row["wall_s"]]
+                out.writerow([body["name"], body["half"], scan, *(f"{number(str(v)):.5g}" for v in values)])
+            file.flush()
+            print(body["name"], flush=True)
+
+
+def line(rows, truths):
+    """How far the rows are off the body and the image, and how often the body lies within what they state."""
+    far = [off(r, truths) for r in rows]
+    stated = [100 * number(r["error_mpa"]) / number(r["e_app_mpa"]) for r in rows]
+    ratio = [s / max(abs(o), 0.1) for o, s in zip(far, stated)]
+    seconds = [number(r["seconds"]) for r in rows]
+    return [
+        f"{statistics.fmean(far):+.1f}", f"{rms(far):.1f}", f"{max(far, key=abs):+.1f}", f"{rms([off(r, truths, 'e_image_mpa') for r in rows]):.1f}",
+        f"{max((off(r, truths, 'e_image_mpa') for r in rows), key=abs):+.1f}", f"{sum(within(r, truths) for r in rows)} of {len(rows)}",
+        f"{statistics.median(stated):.1f}", f"{statistics.median(ratio):.1f}", f"{statistics.median(seconds):.1f}",
+    ]
+
+
+def draw():
+    truths = read(truth_set.REPORTS / "references.csv", lambda r: r["body"])
+    with open(ROWS) as file:
+        every = list(csv.DictReader(file))
+    rows = [r for r in every if well_known(truths[r["body"]])]
+    head = ["scan", "half", "bodies", "bias %", "RMS %", "worst %", "RMS against image %", "worst against image %", "within stated", "median stated %", "median stated over off", "median s"]
+    lines = []
+    for scan in [*truth_set.SCANS, "all"]:
+        for half in "AB":
+            own = [r for r in rows if r["half"] == half and scan in (r["scan"], "all")]
+            if own:
+                lines.append([scan, half, str(len({r["body"] for r in own})), *line(own, truths)])
+    outside = [[r["body"], r["half"], r["scan"], f"{off(r, truths):+.1f}", f"{100 * number(r['error_mpa']) / number(r['e_app_mpa']):.1f}"] for r in rows if not within(r, truths)]
+    tables = {"errors": table(head, lines), "outside": table(["body", "half", "scan", "off %", "stated %"], outside)}
+    text = PAGE.read_text()
+    for key, words in tables.items():
+        print(f"\n{words}")
+        text = re.sub(rf"(<!-- {key} -->\n).*?(<!-- end -->)", lambda m: m[1] + words + "\n" + m[2], text, flags=re.S)
+    PAGE.write_text(text)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program", nargs="?")
+    parser.add_argument("--bodies", default=",".join(map(str, range(16))), help="lines of truth_set.csv from 0")
+    parser.add_argument("--draw", action="store_true")
+    args = parser.parse_args()
+    if not args.draw:
+        if not args.program:
+            parser.error("give the built program, or --draw")
+        every = bodies(64)
+        measure(pathlib.Path(args.program).resolve(), [every[int(i)] for i in args.bodies.split(",")])
+    draw()
+
+
+if __name__ == "__main__":
+    main()

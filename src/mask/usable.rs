@@ -17,7 +17,7 @@ pub struct Extremes {
     pub non_finite: u64,
 }
 
-const NOTHING: Extremes = Extremes {
+const EMPTY: Extremes = Extremes {
     min: f32::INFINITY,
     max: f32::NEG_INFINITY,
     counts: [0; 2],
@@ -30,7 +30,7 @@ const NOTHING: Extremes = Extremes {
 pub fn extremes(values: &[f32]) -> Option<Extremes> {
     // Parts that stay in the cache while they are passed twice.
     let parts = values.par_chunks(1 << 14).map(of_part);
-    let found = parts.reduce(|| NOTHING, Extremes::and);
+    let found = parts.reduce(|| EMPTY, Extremes::and);
     (found.finite > 0).then_some(found)
 }
 

@@ -132,12 +132,12 @@ impl Stencil {
         let mut chains: Vec<Vec<usize>> = Vec::new();
         for b in order {
             let [_, y, z] = self.direction(b);
-            let beside = |chain: &&mut Vec<usize>| {
+            let is_next = |chain: &&mut Vec<usize>| {
                 let [_, other_y, other_z] = self.direction(chain[0]);
                 // In the site's own row, the site stands between.
                 [y, z] != [0, 0] && [y, z] == [other_y, other_z]
             };
-            match chains.iter_mut().find(beside) {
+            match chains.iter_mut().find(is_next) {
                 Some(chain) => chain.push(b),
                 None => chains.push(vec![b]),
             }

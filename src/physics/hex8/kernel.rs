@@ -33,7 +33,7 @@ pub fn wide<S: Copy>(modal: &Modal<S>) -> Wide<S> {
     modal.map(|v| [v; 8])
 }
 
-/// Nodes per task: some layers, as of each task one more is made in vain.
+/// Nodes per task: some layers, because each task computes one layer more than it uses.
 pub fn chunk(mesh: &VoxelMesh) -> usize {
     let layers = mesh.grid.n[2] + 1;
     let thick = (layers / 16).clamp(4, 8);

@@ -1,6 +1,6 @@
 //! Owns which site moves with which aggregate, and sums over aggregates.
 //!
-//! Sites are told in chunks, each with the list of the few aggregates that it has part in: a site's own entry is two
+//! Sites are stored in chunks, each with the list of the few aggregates that it has part in: a site's own entry is two
 //! bytes, and sums go chunk by chunk, then list by list, in an order that does not depend on the number of threads.
 
 use rayon::prelude::*;

@@ -141,8 +141,8 @@ fn scaled_residual<const D: usize>(
     });
 }
 
-/// `g = P₀ᵀ (s − ω A t)`, where `s = b − A x` and `t = D⁻¹ s`. The residual is had back from `t` where that is exact,
-/// and made again elsewhere: a vector less to keep.
+/// `g = P₀ᵀ (s − ω A t)`, where `s = b − A x` and `t = D⁻¹ s`. The residual is recovered from `t` where that is exact,
+/// and computed again elsewhere: one vector less to keep.
 fn restrict<const D: usize>(
     level: &impl Level<D>,
     omega: f32,

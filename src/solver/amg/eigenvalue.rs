@@ -24,7 +24,7 @@ pub fn largest(
         .collect();
     let zero = vec![[0.0; 6]; n];
     let (mut z, mut p, mut q) = (zero.clone(), zero.clone(), zero);
-    let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
+    let (mut diagonal, mut off_diagonal) = (Vec::new(), Vec::new());
     let (mut rz_before, mut alpha_before) = (0.0, 1.0);
     for step in 0..steps {
         precondition(&r, &mut z);
@@ -41,14 +41,14 @@ pub fn largest(
         }
         let alpha = rz / curvature;
         if step > 0 {
-            beside.push(beta.sqrt() / alpha_before);
+            off_diagonal.push(beta.sqrt() / alpha_before);
         }
         diagonal.push(1.0 / alpha + beta / alpha_before);
         let values = r.par_iter_mut().with_min_len(chunk).zip(&q);
         values.for_each(|(r, q)| *r = std::array::from_fn(|d| r[d] - alpha as f32 * q[d]));
         (rz_before, alpha_before) = (rz, alpha);
     }
-    largest_of_tridiagonal(&diagonal, &beside) as f32
+    largest_of_tridiagonal(&diagonal, &off_diagonal) as f32
 }
 
 fn dot(a: &Six, b: &Six) -> f64 {
@@ -63,17 +63,17 @@ fn sum(n: usize, size: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
 }
 
 /// By bisection: the pivots of `T − x` are all negative where `x` is above every eigenvalue (Sturm).
-fn largest_of_tridiagonal(diagonal: &[f64], beside: &[f64]) -> f64 {
+fn largest_of_tridiagonal(diagonal: &[f64], off_diagonal: &[f64]) -> f64 {
     let above = |x: f64| {
         let mut pivot = 1.0;
         diagonal.iter().enumerate().all(|(i, d)| {
-            let b = if i == 0 { 0.0 } else { beside[i - 1] };
+            let b = if i == 0 { 0.0 } else { off_diagonal[i - 1] };
             pivot = d - x - b * b / pivot;
             pivot < 0.0
         })
     };
     let most = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
-    let (mut low, mut high) = (0.0, most(diagonal) + 2.0 * most(beside));
+    let (mut low, mut high) = (0.0, most(diagonal) + 2.0 * most(off_diagonal));
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if above(middle) {

@@ -19,7 +19,7 @@ pub struct Fine<'a, O> {
     /// Zero in held components and at padding.
     diagonal: Diagonal,
     aggregates: Aggregates,
-    /// Each aggregate's centre and the inverse of its radius: motions are told in units of the radius.
+    /// Each aggregate's centre and the inverse of its radius: motions are in units of the radius.
     frames: Vec<[f64; 4]>,
     /// Orthonormal motions of each aggregate from plain ones.
     bases: Vec<[Six; 6]>,
@@ -111,7 +111,7 @@ impl<'a, O: Coarsen> Fine<'a, O> {
         }
     }
 
-    /// Bytes beside the operator's.
+    /// Bytes in addition to the operator's.
     pub fn bytes(&self) -> usize {
         self.diagonal.bytes() + self.aggregates.bytes() + self.frames.len() * (32 + 144)
     }
@@ -143,7 +143,7 @@ fn hinges(operator: &impl Coarsen) -> Vec<bool> {
 }
 
 /// Least strength of a coupling, its Frobenius norm over the root of the two sites' stiffness, along which sites become one
-/// aggregate (Vaněk, Mandel & Brezina 1996). Neighbours in one tissue have 0.05 or more; stiff and soft tissue part where
+/// aggregate (Vaněk, Mandel & Brezina 1996). Neighbours of one stiffness have 0.05 or more; stiff and soft regions part where
 /// they differ by some 30 and more. A stiff part cut by soft voxels then moves on its own on the coarser levels.
 const STRONG: f32 = 0.05;
 

@@ -37,7 +37,7 @@ use std::sync::Mutex;
 /// How to coarsen and smooth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AmgParams {
-    /// Edges of the boxes in which the finest level's sites are aggregated, in mm. On trabecular bone the whole time
+    /// Edges of the boxes in which the finest level's sites are aggregated, in mm. On thin structure the whole time
     /// to 0.1 % is much the same from three to seven sites wide (5 to 8 iterations on plump, 7 to 14 on thin structure);
     /// wider boxes take less memory.
     pub box_mm: [f64; 3],
@@ -45,7 +45,7 @@ pub struct AmgParams {
     pub degrees: [usize; 2],
     /// Sites at which a level is factorised instead of coarsened.
     pub coarsest: usize,
-    /// Cycles that solve an assembled level. On bricks two halve the iterations (thin bone to 1e-6: 59 and 28), on lattices the
+    /// Cycles that solve an assembled level. On bricks two halve the iterations (thin structure to 1e-6: 59 and 28), on lattices the
     /// finest level is what limits them.
     pub cycles: usize,
 }

@@ -14,9 +14,9 @@
 /// `μ = min(θ_k² / θ_{2k/3}, (π / 2k)² θ_1) / 2.25`. The divisor was set on 195 hard bodies (`reports/stability.md`).
 #[derive(Debug, Clone)]
 pub struct EnergyTail {
-    /// The Lanczos matrix: diagonal, and squares of what stands beside it.
+    /// The Lanczos matrix: diagonal, and squares of its off-diagonal.
     diagonal: Vec<f64>,
-    beside: Vec<f64>,
+    off_diagonal: Vec<f64>,
     /// `θ` after each iteration.
     smallest: Vec<f64>,
     total: f64,
@@ -32,7 +32,7 @@ impl Default for EnergyTail {
     fn default() -> Self {
         EnergyTail {
             diagonal: Vec::new(),
-            beside: Vec::new(),
+            off_diagonal: Vec::new(),
             smallest: Vec::new(),
             total: 0.0,
             phi: 1.0,
@@ -73,7 +73,7 @@ impl EnergyTail {
         } else {
             let beta = rz / rz_before;
             self.diagonal.push(1.0 / alpha + beta / alpha_before);
-            self.beside.push(beta / (alpha_before * alpha_before));
+            self.off_diagonal.push(beta / (alpha_before * alpha_before));
         }
         self.total += alpha * rz;
         self.last = (alpha, rz);
@@ -150,7 +150,7 @@ impl EnergyTail {
     /// Whether the Lanczos matrix has an eigenvalue below `x`: a negative pivot of `T − x`.
     fn has_below(&self, x: f64) -> bool {
         let mut pivot = self.diagonal[0] - x;
-        for (d, squared) in self.diagonal[1..].iter().zip(&self.beside) {
+        for (d, squared) in self.diagonal[1..].iter().zip(&self.off_diagonal) {
             if pivot <= 0.0 {
                 return true;
             }
@@ -212,7 +212,7 @@ mod tests {
         let n = 40;
         let tail = EnergyTail {
             diagonal: vec![2.0; n],
-            beside: vec![1.0; n - 1],
+            off_diagonal: vec![1.0; n - 1],
             ..EnergyTail::default()
         };
         let exact = 2.0 - 2.0 * (std::f64::consts::PI / (n + 1) as f64).cos();

@@ -96,14 +96,14 @@ pub fn minimise<F: Functional<3>>(
             tail.push_change(change);
         }
         fallen = unit * norm / start.norm;
-        let told = anchor.0 - (tail.total() - anchor.1);
+        let expected = anchor.0 - (tail.total() - anchor.1);
         if fallen <= params.residual_tolerance {
             ended = Ended::ResidualTolerance;
-        } else if norm < REPLACE || told < REPLACE * anchor.0 {
+        } else if norm < REPLACE || expected < REPLACE * anchor.0 {
             let before = unit;
             unit *= norm;
             let now = residual(operator, held, u, unit, &mut r);
-            ended = checked(ended, told, now.energy, anchor.0);
+            ended = checked(ended, expected, now.energy, anchor.0);
             if now.energy > RISE * anchor.0 {
                 ended = Ended::Breakdown;
             }
@@ -123,8 +123,8 @@ pub fn minimise<F: Functional<3>>(
         }
     }
     let end = residual(operator, held, u, unit.max(f64::MIN_POSITIVE), &mut r);
-    let told = anchor.0 - (tail.total() - anchor.1);
-    ended = checked(ended, told, end.energy, anchor.0);
+    let expected = anchor.0 - (tail.total() - anchor.1);
+    ended = checked(ended, expected, end.energy, anchor.0);
     CgInfo {
         ended,
         iterations,

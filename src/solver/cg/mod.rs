@@ -41,7 +41,7 @@ impl Default for CgParams {
 }
 
 /// Part of the start's energy below which the faces are joined by a mechanism. The start is the field of a homogeneous bar: 1e-10 of it is
-/// far below any bone's stiffness and far above double precision's rounding.
+/// far below the stiffness of any body that bears load and far above double precision's rounding.
 pub(super) const MECHANISM_ENERGY: f64 = 1e-10;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -221,8 +221,8 @@ pub fn minimise<F: Functional<D>, const D: usize>(
 
 /// How a solve goes on or ends, given what its iterations say the energy is, what it is, and from what they began. In
 /// single precision each iteration is off by some 1e-7 of what it lowers the energy by.
-pub(super) fn checked(ended: Ended, told: f64, energy: f64, begun: f64) -> Ended {
-    match (energy - told).abs() <= 1e-2 * energy.abs() + 1e-5 * begun {
+pub(super) fn checked(ended: Ended, expected: f64, energy: f64, start: f64) -> Ended {
+    match (energy - expected).abs() <= 1e-2 * energy.abs() + 1e-5 * start {
         true => ended,
         false => Ended::Breakdown,
     }

@@ -169,13 +169,13 @@ impl<'a> Recorder<'a> {
         let [nx, ny, nz] = mesh.grid.n;
         let free_faces = |e: usize| {
             let at = [e % nx, e / nx % ny, e / (nx * ny)];
-            let beside = [(0, 1, nx), (1, nx, ny), (2, nx * ny, nz)];
+            let neighbours = [(0, 1, nx), (1, nx, ny), (2, nx * ny, nz)];
             let free = |(axis, stride, n): (usize, usize, usize)| {
                 let low = at[axis] > 0 && !filled[e - stride];
                 let high = at[axis] + 1 < n && !filled[e + stride];
                 usize::from(low) + usize::from(high)
             };
-            beside.into_iter().map(free).sum()
+            neighbours.into_iter().map(free).sum()
         };
         surface_energy(sampled.into_iter().map(|(element, density)| Element {
             energy_density_mpa: f64::from(density),

@@ -106,7 +106,7 @@ pub fn accelerated(
     }
 }
 
-/// One cycle for `A x = b` from zero. Beside `b` and `x` there is one vector more, `spare`.
+/// One cycle for `A x = b` from zero. In addition to `b` and `x` there is one vector more, `spare`.
 pub fn cycle<const D: usize>(
     level: &impl Level<D>,
     how: &Smoothing,

@@ -45,7 +45,10 @@ impl VoxelModel {
             }
         };
         let points = Points::new(mesh.grid.spacing_mm, true);
-        let multigrid = AmgParams::new(mesh.grid.spacing_mm);
+        let multigrid = AmgParams {
+            cycles: 2,
+            ..AmgParams::new(mesh.grid.spacing_mm)
+        };
         let preconditioner = Amg::new(&self.bricks, held, &multigrid);
         let loading = Loading {
             held,

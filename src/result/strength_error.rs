@@ -2,7 +2,7 @@
 //!
 //! The error of load steps falls with their length. That of elements of one body falls with a power of their edge: about 1 where struts are
 //! several voxels thick, 0.4 where voxels meet in edges (`reports/strength.md`). The power is fitted to three sizes; of two it is taken for
-//! [`ORDER`]. With the power `p` a difference between two sizes leaves `sizeᵖ / (largerᵖ − smallerᵖ)` times as much at `size`.
+//! 1/2. With the power `p` a difference between two sizes leaves `sizeᵖ / (largerᵖ − smallerᵖ)` times as much at `size`.
 
 use crate::result::row::Row;
 use crate::result::strength::Strength;

@@ -53,7 +53,6 @@ fn model(report: &Report, rows: &[&Row]) -> String {
     let sizes = settings(rows.iter().map(|row| row.key.lp_mm));
     match (key.method, key.boundary) {
         (Method::Lattice, Some(boundary)) => lattice(report, rows, boundary, &sizes),
-        (Method::Lattice, None) => format!("Bone was represented by a lattice of {sizes} mm."),
         (Method::VoxelFe, boundary) => {
             let dilatation = integration(rows[0].key.poisson);
             let limit = match boundary {
@@ -73,6 +72,10 @@ fn model(report: &Report, rows: &[&Row]) -> String {
         (Method::GeometryFe, _) => format!(
             "{} The edge of the cells that the elements were made in was {sizes} mm.",
             tetrahedra(key.elements)
+        ),
+        (method, _) => format!(
+            "Bone was represented by the method {} with a cell of {sizes} mm.",
+            method.name()
         ),
     }
 }

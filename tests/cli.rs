@@ -16,7 +16,7 @@ pub fn run(args: &[&str]) -> (i32, String, String) {
     )
 }
 
-const VERBS: [&str; 11] = [
+pub const VERBS: [&str; 12] = [
     "segment",
     "lattice",
     "solve",
@@ -28,6 +28,7 @@ const VERBS: [&str; 11] = [
     "recipe",
     "columns",
     "completions",
+    "man",
 ];
 
 #[test]

@@ -2,8 +2,9 @@
 
 use crate::cohort::job::ScanJob;
 use crate::image::slices::natural;
+use crate::io::own_files;
 use crate::machine::session::Session;
-use crate::record::{results, specimen};
+use crate::record::specimen;
 use std::path::Path;
 
 /// Names of the scans that have results in `out` and are not among `jobs`, in the order of their names.
@@ -12,7 +13,7 @@ pub fn names(out: &Path, jobs: &[ScanJob]) -> Vec<String> {
     let mut names: Vec<String> = folders
         .filter(|folder| {
             let has = |file: &str| folder.path().join(file).is_file();
-            has(specimen::RECORD) && has(results::TABLE)
+            has(specimen::RECORD) && has(own_files::RESULTS)
         })
         .filter_map(|folder| folder.file_name().into_string().ok())
         .filter(|name| !jobs.iter().any(|job| job.name == *name))

@@ -14,7 +14,7 @@ use crate::cohort::scans::Selection;
 use crate::command::estimate::{Estimate, estimate};
 use crate::command::{Outcome, adaptive, answer, lattice, report, segment, solve};
 use crate::error::{Error, Result};
-use crate::io::{atomic, table};
+use crate::io::{atomic, own_files, table};
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
@@ -127,7 +127,7 @@ impl Run<'_> {
             env!("CARGO_PKG_VERSION"),
             job.input.display()
         ));
-        let before: Vec<Row> = table::read(&dir.join(results::TABLE)).unwrap_or_default();
+        let before: Vec<Row> = table::read(&dir.join(own_files::RESULTS)).unwrap_or_default();
         let solved = catch_unwind(AssertUnwindSafe(|| steps(self.recipe, job, &dir, &own)))
             .unwrap_or_else(|_| {
                 Err(Error::specimen(
@@ -175,7 +175,7 @@ impl Run<'_> {
         let mut rows = Vec::new();
         for name in &self.names {
             let is_done = |i: usize| matches!(done[i], Some(Ok(_)));
-            let file = self.out.join(name).join(results::TABLE);
+            let file = self.out.join(name).join(own_files::RESULTS);
             if self.job(name).is_none_or(is_done) && file.is_file() {
                 rows.extend(table::read::<Row>(&file)?);
             }
@@ -190,13 +190,13 @@ impl Run<'_> {
     /// The recipe as it is run. One of an earlier run that differs is kept too.
     fn write_recipe(&self) -> Result<String> {
         let recipe = toml::to_string(self.recipe).expect("settings are plain data");
-        let file = self.out.join(report::RECIPE);
+        let file = self.out.join(own_files::RECIPE);
         if std::fs::read_to_string(&file).is_ok_and(|old| old != recipe) {
-            let _ = std::fs::rename(&file, self.out.join(report::OLD_RECIPE));
+            let _ = std::fs::rename(&file, self.out.join(own_files::OLD_RECIPE));
             self.session.say(format!(
                 "note: an earlier run in {} had another recipe: its rows are kept with the new ones, its recipe is {}",
                 self.out.display(),
-                report::OLD_RECIPE
+                own_files::OLD_RECIPE
             ));
         }
         atomic::write(&file, &recipe)?;
@@ -226,7 +226,7 @@ impl Run<'_> {
             let recipe = self.write_recipe()?;
             let dirs = [self.out.to_path_buf()];
             let answers = report::answers(&rows, &dirs, self.recipe.error);
-            table::write(&self.out.join(report::ANSWERS), &answers.lines)?;
+            table::write(&self.out.join(own_files::ANSWERS), &answers.lines)?;
             let sources = report::Sources {
                 rows: &rows,
                 answers,
@@ -259,7 +259,7 @@ impl Run<'_> {
     fn set_earlier_report_aside(&self) {
         let moved =
             |from: &str, to: &str| std::fs::rename(self.out.join(from), self.out.join(to)).is_ok();
-        if moved(report::ANSWERS, "answers.old.csv") | moved("report", "report.old") {
+        if moved(own_files::ANSWERS, "answers.old.csv") | moved("report", "report.old") {
             self.session.warn(format!(
                 "no scan has results: those of an earlier run in {} are kept as answers.old.csv, {} and report.old",
                 self.out.display(),
@@ -271,7 +271,7 @@ impl Run<'_> {
     fn say_where(&self) {
         self.session.result(format!(
             "answers, one line a scan: {}; page: {}",
-            self.out.join(report::ANSWERS).display(),
+            self.out.join(own_files::ANSWERS).display(),
             self.out.join("report/report.html").display()
         ));
     }

@@ -1,6 +1,6 @@
 //! Owns what a later `solve` in a run's folder takes from the run: its load, its ends and its tissue.
 
-use crate::command::report::RECIPE;
+use crate::io::own_files::RECIPE;
 use crate::pipeline::apparent::SolveParams;
 use crate::recipe::Recipe;
 use crate::record::specimen;

@@ -29,7 +29,7 @@ use crate::result::details::Details;
 use crate::result::extrapolate::is_extrapolated;
 use crate::result::notes;
 use crate::result::row::{FailureLoad, Marks, Row};
-use crate::result::settings::{BoundaryRule, Elements, Settings};
+use crate::result::settings::{BoundaryRule, Settings};
 use crate::result::shape;
 use crate::result::shape::Image;
 use crate::result::voxel_check;
@@ -302,8 +302,8 @@ impl OpenScan {
         })
     }
 
-    /// What one solve by finite elements states of its error against the body; `euler`: numbers of elements and mask.
-    fn state(&self, row: &mut Row, euler: [i64; 2]) {
+    /// What one solve by finite elements states of its error against the body; `euler`: numbers of smooth elements and mask.
+    fn state(&self, row: &mut Row, euler: Option<[i64; 2]>) {
         let sensitivity = row.solved.as_ref().and_then(|s| s.threshold_sensitivity);
         let voxel_mm = self.specimen.bone.grid.voxel_mm3().cbrt();
         let size = row.key.lp_mm / voxel_mm;
@@ -312,11 +312,9 @@ impl OpenScan {
             notes::add(&mut row.marks.note, shape::INTERFACES);
         } else if let Some(elements) = row.key.elements {
             let surface = self.surface(sensitivity);
-            let stated = match elements {
-                Elements::SmoothGrey | Elements::SmoothMask => {
-                    Some(shape::of_smooth(self.image, size, surface, euler))
-                }
-                _ => shape::of_one_solve(self.image, elements, size, surface),
+            let stated = match euler {
+                Some(euler) => Some(shape::of_smooth(self.image, size, surface, euler)),
+                None => shape::of_one_solve(self.image, elements, size, surface),
             };
             shape::state(row, stated);
         }

@@ -287,10 +287,6 @@ pub struct LatticeSummary {
 }
 
 pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSummary {
-    let whole = sites
-        .weights
-        .as_ref()
-        .map_or(sites.len() as f64, |w| w.iter().sum());
     LatticeSummary {
         structure: case.structure,
         boundary: case.boundary.into(),
@@ -301,7 +297,7 @@ pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSumm
             .filter(|&s| sites.fully_coordinated(s))
             .count(),
         dropped_sites: sites.dropped,
-        lattice_bv_tv: whole * sites.cell_mm3() / specimen.tv_mm3,
+        lattice_bv_tv: sites.volume_mm3() / specimen.tv_mm3,
     }
 }
 
@@ -311,7 +307,6 @@ pub fn summarise_connected(
     case: &Case,
     sites: &ConnectedSites,
 ) -> LatticeSummary {
-    let bone: f64 = sites.fractions.iter().map(|&f| f64::from(f)).sum();
     let directions = case.structure.stencil().coordination();
     let whole = |s: &usize| {
         let mut met = vec![false; directions];
@@ -326,7 +321,7 @@ pub fn summarise_connected(
         bonds: sites.pairs().count(),
         fully_coordinated_sites: (0..sites.len()).filter(whole).count(),
         dropped_sites: sites.dropped,
-        lattice_bv_tv: bone * case.lp_mm.powi(3) / specimen.tv_mm3,
+        lattice_bv_tv: sites.bone_mm3() / specimen.tv_mm3,
     }
 }
 

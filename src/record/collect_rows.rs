@@ -1,10 +1,11 @@
 //! Owns reading solved scans back: the tables of runs and of single scans, the newer before the older.
 
 use crate::error::{Error, Result};
+use crate::io::own_files::RESULTS;
 use crate::io::table;
 use crate::machine::session::Session;
 use crate::record::failures::{Failure, failures_in};
-use crate::record::results::{OLD_TABLE, TABLE};
+use crate::record::results::OLD_TABLE;
 use crate::record::specimen;
 use crate::result::row::Row;
 use std::path::{Path, PathBuf};
@@ -24,19 +25,19 @@ impl CollectedRows {
     /// # Errors
     /// A folder without `results.csv`, a table that cannot be read.
     pub fn add(&mut self, dir: &Path, session: &Session) -> Result<()> {
-        let file = dir.join(TABLE);
+        let file = dir.join(RESULTS);
         if !file.is_file() {
             let old = dir.join(OLD_TABLE).is_file();
             return Err(Error::file(
                 dir,
                 match old {
                     true => format!(
-                        "expected {TABLE}, found only {OLD_TABLE}: results of another mask, which a later run has set aside"
+                        "expected {RESULTS}, found only {OLD_TABLE}: results of another mask, which a later run has set aside"
                     ),
-                    false => format!("expected a folder with {TABLE}, found none"),
+                    false => format!("expected a folder with {RESULTS}, found none"),
                 },
                 match old {
-                    true => format!("run again, or rename {OLD_TABLE} to {TABLE}"),
+                    true => format!("run again, or rename {OLD_TABLE} to {RESULTS}"),
                     false => "name folders that `solve` or `run` has written to".to_owned(),
                 },
             ));
@@ -62,7 +63,7 @@ fn newer_in(dir: &Path, file: &Path) -> Vec<(String, PathBuf)> {
     let written = |path: &Path| -> Option<SystemTime> { path.metadata().ok()?.modified().ok() };
     let folders = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let newer = folders.filter_map(|folder| {
-        let own = folder.path().join(TABLE);
+        let own = folder.path().join(RESULTS);
         let record = specimen::record(&folder.path())?;
         (written(&own)? > written(file)?).then_some((record.scan, own))
     });

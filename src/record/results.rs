@@ -3,7 +3,8 @@
 //! redone.
 
 use crate::error::{Error, Result};
-use crate::io::{atomic, own_files, table};
+use crate::io::own_files::RESULTS;
+use crate::io::{atomic, table};
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::measure::pistoia::Pistoia;
@@ -18,9 +19,6 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// The rows of a scan, or of a run, for other programs.
-pub const TABLE: &str = own_files::RESULTS;
-
 /// The same with provenance.
 const RECORD: &str = "results.json";
 
@@ -31,12 +29,12 @@ pub const OLD_TABLE: &str = "results.old.csv";
 /// current; the tables that belong to it are removed. True if there was one.
 pub fn set_aside(dir: &Path) -> bool {
     details::remove(dir);
-    std::fs::rename(dir.join(TABLE), dir.join(OLD_TABLE)).is_ok()
+    std::fs::rename(dir.join(RESULTS), dir.join(OLD_TABLE)).is_ok()
 }
 
 /// Whether results were set aside and no others took their place.
 pub fn has_old(dir: &Path) -> bool {
-    dir.join(OLD_TABLE).is_file() && !dir.join(TABLE).is_file()
+    dir.join(OLD_TABLE).is_file() && !dir.join(RESULTS).is_file()
 }
 
 /// The same where the mask in `dir` is not that of the results.
@@ -73,7 +71,7 @@ pub fn criteria(dir: &Path) -> Vec<(Pistoia, Vec<i32>)> {
 
 /// Writes `results.csv`; an older one that was set aside goes.
 pub fn write_table(dir: &Path, rows: &[Row]) -> Result<()> {
-    table::write(&dir.join(TABLE), rows)?;
+    table::write(&dir.join(RESULTS), rows)?;
     let _ = std::fs::remove_file(dir.join(OLD_TABLE));
     Ok(())
 }
@@ -381,7 +379,7 @@ mod tests {
             ..params.clone()
         };
         assert_eq!(again.find(&blank(FIRM), &tighter), None);
-        let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
+        let table: Vec<Row> = table::read(&dir.path().join(RESULTS)).unwrap();
         assert_eq!(table.len(), 3);
         assert_eq!(table[2].key.boundary, Some(BoundaryRule::Ffb));
 
@@ -414,7 +412,7 @@ mod tests {
         results
             .store(&blank(FIRM), &params, &solved(FIRM, 1.0), None)
             .unwrap();
-        let table: Vec<Row> = table::read(&dir.path().join(TABLE)).unwrap();
+        let table: Vec<Row> = table::read(&dir.path().join(RESULTS)).unwrap();
         assert_eq!(table, [solved(FIRM, 1.0)]);
     }
 }

@@ -68,7 +68,7 @@ fn curves<'a>(
                     family.model.name_on(family.structure)
                 )
             }
-            _ => family.model.name_on(family.structure).to_owned(),
+            _ => family.model.name_on(family.structure),
         };
         if let (true, Some(words)) = (conditions.len() > 1, &family.condition) {
             name = format!("{name}, {words}");

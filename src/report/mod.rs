@@ -241,13 +241,12 @@ impl Model {
     }
 
     /// Of one structure, whose own name the method has there.
-    pub fn name_on(self, structure: CellType) -> &'static str {
-        match (self, structure.is_simple_cubic()) {
-            (Model::Graded, true) => "connected",
-            (Model::Graded, false) => "weighted",
-            (Model::GradedLimit, true) => "connected, extrapolated",
-            (Model::GradedLimit, false) => "weighted, extrapolated",
-            _ => self.name(),
+    pub fn name_on(self, structure: CellType) -> String {
+        let own = BoundaryRule::Graded.method_name(structure);
+        match self {
+            Model::Graded => own.to_owned(),
+            Model::GradedLimit => format!("{own}, extrapolated"),
+            _ => self.name().to_owned(),
         }
     }
 

@@ -40,10 +40,6 @@ impl CellType {
         matches!(self, CellType::Lattice(_))
     }
 
-    pub fn is_simple_cubic(self) -> bool {
-        self == CellType::Lattice(Structure::Sc)
-    }
-
     pub fn name(self) -> &'static str {
         match self {
             CellType::Lattice(structure) => structure.name(),

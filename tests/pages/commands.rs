@@ -1,7 +1,7 @@
 //! Command lines of the pages: the built program understands each.
 
 use super::{pages, root, spans};
-use crate::cli::{bonepd, run};
+use crate::cli::{VERBS, bonepd, run};
 use std::collections::BTreeSet;
 
 /// Command lines in blocks of code, fenced or indented, with the number of their line: the words after the program's name.
@@ -128,22 +128,8 @@ fn commands_in_text_are_understood() {
 
 /// Options of all commands, as their help lists them.
 fn known_options() -> BTreeSet<String> {
-    let verbs = [
-        "segment",
-        "lattice",
-        "solve",
-        "report",
-        "run",
-        "phantom",
-        "info",
-        "scene",
-        "recipe",
-        "columns",
-        "completions",
-        "man",
-    ];
     let mut known = BTreeSet::new();
-    for verb in verbs {
+    for verb in VERBS {
         let (_, help, _) = run(&[verb, "--help"]);
         known.extend(options(&help).into_iter().map(str::to_owned));
     }

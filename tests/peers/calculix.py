@@ -102,19 +102,41 @@ STACK = pathlib.Path(os.environ.get("BONEPD_STACK", ROOT.parent / "shared/data/l
 CROP = ["--spacing", "0.0195", "--gaussian", "1", "--lower", "63", "--crop", "60:96,60:96,80:116"]
 
 
-def run_calculix(folder):
+def is_missing():
+    """Says so where CalculiX is not installed."""
+    missing = shutil.which("ccx") is None
+    if missing:
+        print("skipped: ccx is not installed (Debian: calculix-ccx)")
+    return missing
+
+
+def segmented(temporary, name, n, spacing, bone, words=("--lower", "1"), program=PROGRAM):
+    """A folder with the body, segmented."""
+    base = pathlib.Path(temporary) / name.replace(" ", "-").replace(":", "-")
+    scan = base.with_suffix(".nii")
+    nifti(scan, n, spacing, bone)
+    subprocess.run([program, "segment", scan, "-o", base, "--quiet", *words], check=True)
+    return base
+
+
+def two_tissues(bone):
+    """The same bone in labels 1 and 2."""
+    return lambda x, y, z: bone(x, y, z) * (1 + (x + 2 * y + z) % 3 // 2)
+
+
+def run_calculix(folder, deck="voxel-fe"):
     """What CalculiX prints of the exported model."""
-    run = subprocess.run(["ccx", "voxel-fe"], cwd=folder, capture_output=True, text=True)
+    run = subprocess.run(["ccx", deck], cwd=folder, capture_output=True, text=True)
     if run.returncode != 0:
         sys.exit(f"ccx failed: {run.stdout[-2000:]}{run.stderr[-500:]}")
-    return (folder / "voxel-fe.dat").read_text()
+    return (folder / f"{deck}.dat").read_text()
 
 
-def calculix(folder):
-    """The force of the moving grip along x, y, z in N."""
-    text = run_calculix(folder)
-    found = re.search(r"total force \(fx,fy,fz\) for set HIGH[^\n]*\n\s*\n([^\n]+)", text)
-    return [float(v) for v in found.group(1).split()]
+def calculix(folder, deck="voxel-fe"):
+    """The force of the moving grip along x, y, z in N, at the end of the load."""
+    text = run_calculix(folder, deck)
+    found = re.findall(r"total force \(fx,fy,fz\) for set HIGH[^\n]*\n\s*\n([^\n]+)", text)
+    return [float(v) for v in found[-1].split()]
 
 
 def moment(folder, about):
@@ -180,23 +202,16 @@ def compare(folder, name, flags):
 
 
 def main():
-    if shutil.which("ccx") is None:
-        print("skipped: ccx is not installed (Debian: calculix-ccx)")
+    if is_missing():
         return
     worst = 0.0
     with tempfile.TemporaryDirectory() as temporary:
         for name, (n, spacing, bone) in SPECIMENS.items():
-            base = pathlib.Path(temporary) / name.replace(" ", "-").replace(":", "-")
-            scan = base.with_suffix(".nii")
-            nifti(scan, n, spacing, bone)
-            subprocess.run([PROGRAM, "segment", scan, "-o", base, "--lower", "1", "--quiet"], check=True)
+            base = segmented(temporary, name, n, spacing, bone)
             worst = max([worst, *(compare(base, name, flags) for flags in LOADS)])
             worst = max([worst, *(compare_moved(base, name, flags) for flags in MOVED)])
         n, spacing, bone = SPECIMENS["plates"]
-        base = pathlib.Path(temporary) / "mixed"
-        nifti(base.with_suffix(".nii"), n, spacing, lambda x, y, z: bone(x, y, z) * (1 + (x + 2 * y + z) % 3 // 2))
-        words = [PROGRAM, "segment", base.with_suffix(".nii"), "-o", base, "--labels", "1,2", "--quiet"]
-        subprocess.run(words, check=True)
+        base = segmented(temporary, "mixed", n, spacing, two_tissues(bone), ["--labels", "1,2"])
         worst = max([worst, *(compare(base, "mixed tissue", flags) for flags in MIXED)])
         if STACK.is_dir():
             base = pathlib.Path(temporary) / "stack"

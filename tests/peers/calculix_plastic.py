@@ -8,14 +8,12 @@ C3D20R on the same bricks, and as C3D8 for comparison. Forces at 1 % strain must
 """
 
 import csv
-import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
 
-from calculix import PROGRAM, SPECIMENS, nifti
+from calculix import PROGRAM, SPECIMENS, calculix, is_missing, segmented
 
 LIMIT = 0.02
 LAW = "von-mises:68,500"
@@ -72,30 +70,22 @@ def block(text, keyword):
     return re.search(re.escape(keyword) + r"[^\n]*\n(.*?)(?=^\*)", text, re.S | re.M).group(1)
 
 
-def calculix(folder, name, text):
-    """The force of the moving end along z at the end of the load, N."""
+def force(folder, name, text):
+    """Of the moving end along z at the end of the load, N."""
     (folder / f"{name}.inp").write_text(text)
-    run = subprocess.run(["ccx", name], cwd=folder, capture_output=True, text=True)
-    if run.returncode != 0:
-        sys.exit(f"ccx failed: {run.stdout[-2000:]}{run.stderr[-500:]}")
-    found = re.findall(r"total force \(fx,fy,fz\) for set HIGH[^\n]*\n\s*\n([^\n]+)", (folder / f"{name}.dat").read_text())
-    return float(found[-1].split()[2])
+    return calculix(folder, name)[2]
 
 
 def main():
-    if shutil.which("ccx") is None:
-        print("skipped: ccx is not installed (Debian: calculix-ccx)")
+    if is_missing():
         return
     worst = 0.0
     with tempfile.TemporaryDirectory() as temporary:
         for name, (n, spacing, bone) in SPECIMENS.items():
-            base = pathlib.Path(temporary) / name.replace(" ", "-").replace(":", "-")
-            n = tuple(min(v, 14) for v in n)
-            nifti(base.with_suffix(".nii"), n, spacing, bone)
-            subprocess.run([PROGRAM, "segment", base.with_suffix(".nii"), "-o", base, "--lower", "1", "--quiet"], check=True)
+            base = segmented(temporary, name, tuple(min(v, 14) for v in n), spacing, bone)
             coarse, fine = solve(base, 1), solve(base, 2)
             text = (base / "voxel-fe.inp").read_text()
-            linear, curved = calculix(base, "linear", text), calculix(base, "quadratic", quadratic(text))
+            linear, curved = force(base, "linear", text), force(base, "quadratic", quadratic(text))
             off = fine / curved - 1
             worst = max(worst, abs(off))
             print(f"{name:13} voxels {coarse:10.5f} N, split once {fine:10.5f}; CalculiX C3D8 {linear:10.5f}, C3D20R {curved:10.5f}  {off:+.2%}", flush=True)

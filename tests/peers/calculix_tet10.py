@@ -7,8 +7,6 @@ Each model is solved here and there; the force of the moving grip from CalculiX'
 
 import json
 import pathlib
-import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -35,13 +33,8 @@ def compare(folder, name, flags):
     if run.returncode != 0:
         sys.exit(f"{name} {flags}: {run.stderr}")
     row = json.loads(run.stdout)[-1]
-    run = subprocess.run(["ccx", "geometry-fe"], cwd=folder, capture_output=True, text=True)
-    if run.returncode != 0:
-        sys.exit(f"ccx failed: {run.stdout[-2000:]}{run.stderr[-500:]}")
-    text = (folder / "geometry-fe.dat").read_text()
-    found = re.search(r"total force \(fx,fy,fz\) for set HIGH[^\n]*\n\s*\n([^\n]+)", text)
     axis = row["load"][-1] if row["load"].startswith("shear") else row["axis"]
-    theirs = abs(float(found.group(1).split()["xyz".index(axis)]))
+    theirs = abs(calculix.calculix(folder, "geometry-fe")["xyz".index(axis)])
     ours = row["force_n"]
     off = ours / theirs - 1
     words = " ".join(flags) or "uniaxial, ends free"
@@ -50,20 +43,15 @@ def compare(folder, name, flags):
 
 
 def main():
-    if shutil.which("ccx") is None:
-        print("skipped: ccx is not installed (Debian: calculix-ccx)")
+    if calculix.is_missing():
         return
     worst = 0.0
     with tempfile.TemporaryDirectory() as temporary:
         for name, (n, spacing, bone) in calculix.SPECIMENS.items():
-            base = pathlib.Path(temporary) / name.replace(" ", "-").replace(":", "-")
-            calculix.nifti(base.with_suffix(".nii"), n, spacing, bone)
-            subprocess.run([PROGRAM, "segment", base.with_suffix(".nii"), "-o", base, "--lower", "1", "--quiet"], check=True)
+            base = calculix.segmented(temporary, name, n, spacing, bone, program=PROGRAM)
             worst = max([worst, *(compare(base, name, flags) for flags in LOADS)])
         n, spacing, bone = calculix.SPECIMENS["plates"]
-        base = pathlib.Path(temporary) / "mixed"
-        calculix.nifti(base.with_suffix(".nii"), n, spacing, lambda x, y, z: bone(x, y, z) * (1 + (x + 2 * y + z) % 3 // 2))
-        subprocess.run([PROGRAM, "segment", base.with_suffix(".nii"), "-o", base, "--labels", "1,2", "--quiet"], check=True)
+        base = calculix.segmented(temporary, "mixed", n, spacing, calculix.two_tissues(bone), ["--labels", "1,2"], PROGRAM)
         worst = max([worst, *(compare(base, "mixed tissue", flags) for flags in MIXED)])
     print(f"largest difference {worst:.1e}")
     if worst > calculix.LIMIT:

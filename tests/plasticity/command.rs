@@ -1,15 +1,14 @@
 //! `solve --plasticity`: rows, curve, restart, refusals.
 
+use super::written_and_segmented;
 use crate::cli::run;
 use crate::specimens::specimen;
-use bonepd_ct::image::nifti;
 use bonepd_ct::io::table;
 use bonepd_ct::physics::plasticity::{Plasticity, VonMises, YieldLaw};
 use bonepd_ct::pipeline::apparent::job::JobResult;
 use bonepd_ct::pipeline::apparent::{Load, Method, SolveParams, of_voxels};
 use bonepd_ct::result::row::Row;
 use bonepd_ct::result::strength::CurvePoint;
-use bonepd_ct::volume::Volume;
 use std::path::Path;
 
 /// Struts of two voxels, in two labels.
@@ -17,21 +16,15 @@ fn segmented(dir: &Path) -> String {
     let frame = specimen([14, 14, 14], [0.02; 3], |p| {
         p.iter().filter(|v| **v % 6 < 2).count() >= 2
     });
-    let grid = frame.bone.grid;
     let label = |i: usize| if i % 14 < 7 { 100.0 } else { 127.0 };
     let values = frame.bone.as_slice().iter().enumerate();
-    let values = values
-        .map(|(i, b)| if *b != 0 { label(i) } else { 0.0 })
-        .collect();
-    let scan = dir.join("scan.nii.gz");
-    nifti::write_field(&scan, &[Volume::from_vec(grid, values)], "labels").unwrap();
-    let out = dir.join("out").to_str().unwrap().to_owned();
-    let scan = scan.to_str().unwrap();
-    let (code, _, words) = run(&[
-        "segment", scan, "-o", &out, "--labels", "100,127", "--quiet",
-    ]);
-    assert_eq!(code, 0, "{words}");
-    out
+    let values = values.map(|(i, b)| if *b != 0 { label(i) } else { 0.0 });
+    written_and_segmented(
+        dir,
+        frame.bone.grid,
+        values.collect(),
+        &["--labels", "100,127"],
+    )
 }
 
 const SOLVE: [&str; 10] = [

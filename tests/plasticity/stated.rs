@@ -1,31 +1,17 @@
 //! `solve --error` with `--plasticity`: the stated error of the strength against much finer solves, targets met and missed.
 
+use super::written_and_segmented;
 use crate::cli::run;
 use crate::specimens::specimen;
-use bonepd_ct::image::nifti;
 use bonepd_ct::io::table;
 use bonepd_ct::record::answer;
 use bonepd_ct::result::row::Row;
-use bonepd_ct::volume::Volume;
 use std::path::Path;
 
 fn segmented(dir: &Path, n: [usize; 3], bone: impl Fn([usize; 3]) -> bool) -> String {
     let body = specimen(n, [0.02; 3], bone);
-    let values = body.bone.as_slice().iter().map(|b| f32::from(*b)).collect();
-    let scan = dir.join("scan.nii.gz");
-    nifti::write_field(&scan, &[Volume::from_vec(body.bone.grid, values)], "mask").unwrap();
-    let out = dir.join("out").to_str().unwrap().to_owned();
-    let (code, _, words) = run(&[
-        "segment",
-        scan.to_str().unwrap(),
-        "-o",
-        &out,
-        "--lower",
-        "1",
-        "--quiet",
-    ]);
-    assert_eq!(code, 0, "{words}");
-    out
+    let values = body.bone.as_slice().iter().map(|b| f32::from(*b));
+    written_and_segmented(dir, body.bone.grid, values.collect(), &["--lower", "1"])
 }
 
 const SOLVE: [&str; 9] = [

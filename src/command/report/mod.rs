@@ -9,14 +9,14 @@ use crate::command::stiffness::RECORD;
 use crate::command::{answer, fields};
 use crate::error::Result;
 use crate::image::scan;
-use crate::io::{atomic, own_files, table};
+use crate::io::own_files::{ANSWERS, RECIPE, RESULTS};
+use crate::io::{atomic, table};
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
 use crate::record::collect_rows::CollectedRows;
 use crate::record::details::{FAILURE, REACTIONS, SECTIONS, TISSUE, YIELDED, curve as curve_of};
 use crate::record::failures::Failure;
-use crate::record::results;
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
 use crate::record::stiffness::StiffnessLine;
@@ -32,15 +32,6 @@ use crate::result::ffb::with_ffb;
 use crate::result::row::Row;
 use crate::result::strength::CurvePoint;
 use std::path::{Path, PathBuf};
-
-/// The recipe as it was run, in the output folder of a run.
-pub const RECIPE: &str = own_files::RECIPE;
-
-/// The recipe of an earlier run into the same folder, where it differs.
-pub const OLD_RECIPE: &str = own_files::OLD_RECIPE;
-
-/// One line a scan.
-pub const ANSWERS: &str = own_files::ANSWERS;
 
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Scans that
 /// were solved again in their own folders after the run are read from there. Returns the files written.
@@ -158,7 +149,7 @@ fn render(
         text("groups.csv", table::to_csv(&report.groups.lines)),
         text("comparisons.csv", table::to_csv(&report.groups.comparisons)),
         text("e_app.csv", table::to_csv(&report.lines)),
-        text(results::TABLE, table::to_csv(&report.rows)),
+        text(RESULTS, table::to_csv(&report.rows)),
     ];
     let statistics = &report.statistics;
     if !statistics.boxes.is_empty() {

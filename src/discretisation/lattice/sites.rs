@@ -131,6 +131,15 @@ impl Sites {
     pub fn cell_mm3(&self) -> f64 {
         self.frame.structure.cell_volume() * self.frame.lp_mm.powi(3)
     }
+
+    /// Volume of all cells in mm³, of weighted sites that of their bone.
+    pub fn volume_mm3(&self) -> f64 {
+        let whole = match &self.weights {
+            Some(weights) => weights.iter().sum(),
+            None => self.len() as f64,
+        };
+        whole * self.cell_mm3()
+    }
 }
 
 /// The candidate one bond away, if within the frame.

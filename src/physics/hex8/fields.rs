@@ -177,7 +177,8 @@ fn centre_strain(h: [f64; 3], corners: &[[f64; 3]; 8]) -> [f64; 6] {
     [xx, yy, zz, yz + zy, xz + zx, xy + yx]
 }
 
-fn von_mises([xx, yy, zz, yz, xz, xy]: [f64; 6]) -> f64 {
+/// Equivalent stress of a stress tensor.
+pub fn von_mises([xx, yy, zz, yz, xz, xy]: [f64; 6]) -> f64 {
     let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
     (0.5 * normal + 3.0 * (yz * yz + xz * xz + xy * xy)).sqrt()
 }

@@ -103,6 +103,11 @@ impl Tet10 {
         [self.lambda, self.mu].map(|m| m * self.factor(e))
     }
 
+    /// Volume of an element in mm³.
+    pub fn volume_mm3(&self, e: usize) -> f64 {
+        shape(&self.mesh, None, e).volume
+    }
+
     /// Of an element, with its factor in the volume.
     pub fn shape(&self, e: usize) -> Shape {
         shape(&self.mesh, self.factor.as_deref(), e)

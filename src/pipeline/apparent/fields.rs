@@ -111,8 +111,8 @@ pub struct Recorded {
     pub surface: Option<SurfaceEnergy>,
     /// What a reader must know of the model.
     pub note: Option<String>,
-    /// Euler numbers of smooth elements and of the mask; equal where they are not compared.
-    pub euler: [i64; 2],
+    /// Euler numbers of smooth elements and of the mask.
+    pub euler: Option<[i64; 2]>,
     /// At the sites of a lattice.
     pub sites: Option<SiteFields>,
     /// At the nodes and in the middles of smooth elements.

@@ -119,6 +119,8 @@ pub fn methods(report: &Report, known: &Known) -> Methods {
         Condition::of(&row.key) != condition && !report.answers.apart.contains(&row.key.scan)
     });
     let others = super::distinct(others.map(|row| Condition::of(&row.key)));
+    let mut lines = report.answers.lines.iter();
+    let has_subjects = lines.any(|line| line.subject.is_some());
     let parts = [
         ("Scans and segmentation", scans::text(report, known)),
         ("Model", model::text(report, &answered)),
@@ -129,7 +131,7 @@ pub fn methods(report: &Report, known: &Known) -> Methods {
             solution::text(&answered, &solved, &condition, known.target),
         ),
         ("Failure", solution::failure(&answered, known)),
-        ("Statistics", statistics::text(&report.groups)),
+        ("Statistics", statistics::text(&report.groups, has_subjects)),
     ];
     let sections: Vec<(String, String)> = parts
         .into_iter()

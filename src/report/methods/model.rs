@@ -157,7 +157,7 @@ fn rule(boundary: BoundaryRule, structure: CellType) -> &'static str {
             "Bone was padded by one layer of points, and the modulus follows from the stress of the fully coordinated points (firm boundary, Zojaji et al. 2024)."
         }
         BoundaryRule::Ffb => {
-            "The modulus is the mean of that of points in bone only (floppy boundary) and that of bone padded by one layer of points (firm boundary), at one lattice parameter (FFB, Zojaji et al. 2024)."
+            "The modulus is the mean of that of points in bone only (floppy boundary) and that of bone padded by one layer of points (firm boundary, from the stress of its fully coordinated points), at one lattice parameter (FFB, Zojaji et al. 2024)."
         }
         BoundaryRule::Graded if connected => {
             "One point represents each connected component of bone in a cell of the lattice (connected boundary)."

@@ -72,7 +72,7 @@ fn errors(answered: &[Answered], target: Option<f64>) -> String {
         let met = answered.iter().filter(|a| a.line.met == Some(true)).count();
         let asked = answered.iter().filter(|a| a.line.met.is_some()).count();
         text += &format!(
-            " Elements were refined where the stated error exceeded {} %; this target was met on {met} of {asked}.",
+            " The target of the stated error was {} %; it was met on {met} of {asked}.",
             setting(100.0 * target)
         );
     }

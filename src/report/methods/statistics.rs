@@ -3,14 +3,18 @@
 use crate::report::distinct;
 use crate::report::groups::Groups;
 
-/// The tests that were made; empty where there is one scan only.
-pub fn text(groups: &Groups) -> String {
+/// The tests that were made; empty where there is one scan only. `has_subjects`: a manifest names some.
+pub fn text(groups: &Groups, has_subjects: bool) -> String {
     if groups.lines.iter().all(|line| line.found.n < 2) {
         return String::new();
     }
-    let mut text =
-        "Values are mean ± standard deviation over subjects; the value of a subject is the mean of its scans."
-            .to_owned();
+    let mut text = match has_subjects {
+        true => {
+            "Values are mean ± standard deviation over subjects; the value of a subject is the mean of its scans."
+        }
+        false => "Values are mean ± standard deviation over scans; no subjects were named.",
+    }
+    .to_owned();
     if groups.comparisons.is_empty() {
         return text;
     }

@@ -4,6 +4,7 @@ use crate::operator::coarsen::{Block, Coarsen};
 use crate::operator::held::Held;
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Symmetric 3 × 3: xx, yy, zz, yz, xz, xy. Zero rows and columns for held components.
 pub type Symmetric = [f32; 6];
@@ -214,7 +215,7 @@ fn distinct(operator: &impl Coarsen, start: usize, held: &[u8]) -> (Vec<Pair>, V
     let mut recent = vec![None; RECENT];
     operator.each_diagonal(start..start + held.len(), &mut |site, block| {
         let key = (*block, held[site - start]);
-        let slot = &mut recent[hash(&key)];
+        let slot = &mut recent[slot(&key)];
         let kind = match *slot {
             Some((before, kind)) if before == key => kind,
             _ => {
@@ -231,16 +232,15 @@ fn distinct(operator: &impl Coarsen, start: usize, held: &[u8]) -> (Vec<Pair>, V
     (kinds, of)
 }
 
-/// Blocks that a chunk remembers, a power of two.
+/// Blocks that a chunk remembers.
 const RECENT: usize = 1024;
 
 /// Where a block and what is held of it are remembered.
-fn hash((block, held): &(Block, u8)) -> usize {
-    let start = u64::from(*held) + 1;
-    let all = block.as_flattened().iter().fold(start, |h, v| {
-        (h.rotate_left(5) ^ u64::from(v.to_bits())).wrapping_mul(0x517c_c1b7_2722_0a95)
-    });
-    (all >> (64 - RECENT.trailing_zeros())) as usize
+fn slot((block, held): &(Block, u8)) -> usize {
+    let mut hasher = DefaultHasher::new();
+    block.map(|row| row.map(f32::to_bits)).hash(&mut hasher);
+    held.hash(&mut hasher);
+    hasher.finish() as usize % RECENT
 }
 
 #[cfg(test)]

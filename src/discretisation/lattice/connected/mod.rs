@@ -114,6 +114,12 @@ struct Component {
 }
 
 impl ConnectedSites {
+    /// Volume of the components' bone in mm³.
+    pub fn bone_mm3(&self) -> f64 {
+        let bone: f64 = self.fractions.iter().map(|&f| f64::from(f)).sum();
+        bone * self.frame.lp_mm.powi(3)
+    }
+
     /// Builds the lattice of simple cubic `frame`, keeping what has a path of bonds to both grips.
     pub fn connect(frame: Frame, bone: &Volume<u8>, grips: Grips) -> Self {
         let (components, touching) = touching::find(&frame, bone);

@@ -23,7 +23,8 @@ use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::result::details::{Details, FailureAt};
+use crate::pipeline::apparent::voxel_fe::failure;
+use crate::result::details::Details;
 use crate::result::settings::{CellType, Elements, Method, Settings};
 use crate::solver::amg::AmgParams;
 use crate::solver::cg::NoGoal;
@@ -188,9 +189,7 @@ impl Discretisation for GeometryModel {
             load_steps: None,
             sites: mesh.elements.len(),
             dropped: self.report.loaded.dropped_elements,
-            volume_mm3: (0..mesh.elements.len())
-                .map(|e| self.model.shape(e).volume)
-                .sum(),
+            volume_mm3: self.report.volume_mm3,
             places: None,
         }
     }
@@ -222,21 +221,14 @@ impl Discretisation for GeometryModel {
         work: &EndWork,
     ) -> Result<Recorded> {
         let (model, surface) = (&self.model, &self.surface);
-        let recorder = Recorder {
-            model: self,
-            params,
-            solved,
-            work,
-        };
+        let recorder = Recorder::new(self, params, solved, work);
         let table = recorder.failures();
-        let criterion = params.pistoia.map(|p| p.critical_volume);
-        let own = |f: &&FailureAt| criterion == Some(f.critical_volume);
         Ok(Recorded {
             surface: sensitivity::of(model, surface, self.is_of_grey, solved.u),
             note: Some(self.report.words(self.is_of_grey)),
-            euler: self.report.euler,
+            euler: Some(self.report.euler),
             mesh: recorder.fields(),
-            failure: table.iter().find(own).cloned(),
+            failure: failure::chosen(&table, params),
             details: Details {
                 failure: table,
                 ..Details::default()
@@ -249,12 +241,15 @@ impl Discretisation for GeometryModel {
 /// Edge of multigrid's boxes over that of a cell: 16 corners a box. Three cells took a third more iterations.
 const BOX: f64 = 2.0;
 
+/// # Errors
+/// Always: these elements do not have what `solve.key` asks for.
+fn refused(key: &str, found: &str) -> Result<()> {
+    let advice = "use --method voxel-fe for that, or leave it out";
+    Err(Error::setting(format!("solve.{key}"), found, advice))
+}
+
 /// What these elements do not offer.
 fn refuse_settings(tissue: &Tissue, params: &SolveParams) -> Result<()> {
-    let refused = |key: &str, found: &str| {
-        let advice = "use --method voxel-fe for that, or leave it out";
-        Err(Error::setting(format!("solve.{key}"), found, advice))
-    };
     if params.refine > 1 || params.coarsen > 1 {
         return Err(Error::setting(
             "solve.refine",

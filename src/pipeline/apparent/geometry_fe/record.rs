@@ -1,8 +1,9 @@
 //! Owns what of solved smooth elements is kept on request: fields of their nodes and their middles, the failure load.
 
-use super::GeometryModel;
-use crate::error::{Error, Result};
+use super::{GeometryModel, refused};
+use crate::error::Result;
 use crate::measure::apparent::EndWork;
+use crate::physics::hex8::fields::von_mises;
 use crate::physics::tet10::strain::within;
 use crate::pipeline::apparent::fields::{Equilibrated, Field, MeshArray, MeshFields};
 use crate::pipeline::apparent::params::{Sed, SolveParams};
@@ -29,13 +30,32 @@ struct Element {
     stress_mpa: [f64; 6],
 }
 
+impl Element {
+    fn of(model: &GeometryModel, sed: Sed, e: usize, u: &[[f64; 3]]) -> Element {
+        let tet = &model.model;
+        let corners = tet.strains(e, u);
+        let strain = within(&corners, [0.25; 4]);
+        let density_mpa = match sed {
+            Sed::Centre => tet.density_mpa(e, &strain),
+            Sed::Mean => tet.mean_density_mpa(e, &corners),
+        };
+        let young_mpa = model.young_mpa * tet.factor(e);
+        let [lambda, mu] = tet.lame_mpa(e);
+        let trace = strain[0] + strain[1] + strain[2];
+        let of_trace = |i: usize| if i < 3 { lambda * trace } else { 0.0 };
+        Element {
+            volume_mm3: tet.volume_mm3(e),
+            density_mpa,
+            effective_strain: (2.0 * density_mpa.max(0.0) / young_mpa).sqrt(),
+            stress_mpa: std::array::from_fn(|i| of_trace(i) + 2.0 * mu * strain[i]),
+            strain: std::array::from_fn(|i| if i < 3 { strain[i] } else { 2.0 * strain[i] }),
+        }
+    }
+}
+
 /// # Errors
 /// Fields and numbers that smooth elements do not have.
 pub fn check(params: &SolveParams) -> Result<()> {
-    let refused = |key: &str, found: &str| {
-        let advice = "use --method voxel-fe for that, or leave it out";
-        Err(Error::setting(format!("solve.{key}"), found, advice))
-    };
     if params.statistics {
         return refused(
             "statistics",
@@ -59,37 +79,38 @@ pub fn check(params: &SolveParams) -> Result<()> {
 
 /// A solved model, to be read as the settings ask.
 pub struct Recorder<'a> {
-    pub model: &'a GeometryModel,
-    pub params: &'a SolveParams,
-    pub solved: &'a Equilibrated<'a>,
-    pub work: &'a EndWork,
+    model: &'a GeometryModel,
+    params: &'a SolveParams,
+    solved: &'a Equilibrated<'a>,
+    work: &'a EndWork,
+    /// Empty where the settings ask for nothing of elements.
+    elements: Vec<Element>,
 }
 
-impl Recorder<'_> {
-    fn element(&self, e: usize) -> Element {
-        let tet = &self.model.model;
-        let corners = tet.strains(e, self.solved.u);
-        let strain = within(&corners, [0.25; 4]);
-        let density_mpa = match self.params.sed {
-            Sed::Centre => tet.density_mpa(e, &strain),
-            Sed::Mean => tet.mean_density_mpa(e, &corners),
+impl<'a> Recorder<'a> {
+    pub fn new(
+        model: &'a GeometryModel,
+        params: &'a SolveParams,
+        solved: &'a Equilibrated<'a>,
+        work: &'a EndWork,
+    ) -> Self {
+        let of_elements = |field: &Field| *field != Field::Displacement;
+        let is_asked = params.pistoia.is_some() || params.fields.iter().any(of_elements);
+        let count = if is_asked {
+            model.model.mesh.elements.len()
+        } else {
+            0
         };
-        let young_mpa = self.model.young_mpa * tet.factor(e);
-        let [lambda, mu] = tet.lame_mpa(e);
-        let trace = strain[0] + strain[1] + strain[2];
-        let of_trace = |i: usize| if i < 3 { lambda * trace } else { 0.0 };
-        Element {
-            volume_mm3: tet.shape(e).volume / tet.factor(e),
-            density_mpa,
-            effective_strain: (2.0 * density_mpa.max(0.0) / young_mpa).sqrt(),
-            stress_mpa: std::array::from_fn(|i| of_trace(i) + 2.0 * mu * strain[i]),
-            strain: std::array::from_fn(|i| if i < 3 { strain[i] } else { 2.0 * strain[i] }),
+        let all = (0..count).into_par_iter();
+        Recorder {
+            elements: all
+                .map(|e| Element::of(model, params.sed, e, solved.u))
+                .collect(),
+            model,
+            params,
+            solved,
+            work,
         }
-    }
-
-    fn elements<T: Send>(&self, read: impl Fn(&Element) -> T + Sync) -> Vec<T> {
-        let all = (0..self.model.model.mesh.elements.len()).into_par_iter();
-        all.map(|e| read(&self.element(e))).collect()
     }
 
     /// By Pistoia's criterion, at all of its volumes.
@@ -97,8 +118,9 @@ impl Recorder<'_> {
         let Some(criterion) = self.params.pistoia else {
             return Vec::new();
         };
-        let strains = self.elements(|e| (e.effective_strain as f32, e.volume_mm3 as f32));
-        let failures = criterion.failures(strains);
+        let strains = self.elements.iter();
+        let strains = strains.map(|e| (e.effective_strain as f32, e.volume_mm3 as f32));
+        let failures = criterion.failures(strains.collect());
         let at = |f| failure::at(f, self.params, &self.model.motion, self.work);
         failures.iter().map(at).collect()
     }
@@ -123,26 +145,22 @@ impl Recorder<'_> {
     }
 
     fn of_elements(&self, field: Field) -> Option<MeshArray> {
-        let scalar = |name, read: &(dyn Fn(&Element) -> f64 + Sync)| {
-            Some(MeshArray::new(name, 1, self.elements(|e| read(e) as f32)))
+        let elements = || self.elements.iter();
+        let scalar = |name, read: fn(&Element) -> f64| {
+            let values = elements().map(|e| read(e) as f32);
+            Some(MeshArray::new(name, 1, values.collect()))
         };
-        let tensor = |name, read: &(dyn Fn(&Element) -> [f64; 6] + Sync)| {
-            let values = self.elements(|e| read(e).map(|v| v as f32));
-            Some(MeshArray::new(name, 6, values.concat()))
+        let tensor = |name, read: fn(&Element) -> [f64; 6]| {
+            let values = elements().flat_map(|e| read(e).map(|v| v as f32));
+            Some(MeshArray::new(name, 6, values.collect()))
         };
         match field {
-            Field::Sed => scalar("sed_mpa", &|e| e.density_mpa),
-            Field::VonMises => scalar("von_mises_mpa", &|e| von_mises(e.stress_mpa)),
-            Field::EffectiveStrain => scalar("effective_strain", &|e| e.effective_strain),
-            Field::Strain => tensor("strain", &|e| e.strain),
-            Field::Stress => tensor("stress_mpa", &|e| e.stress_mpa),
+            Field::Sed => scalar("sed_mpa", |e| e.density_mpa),
+            Field::VonMises => scalar("von_mises_mpa", |e| von_mises(e.stress_mpa)),
+            Field::EffectiveStrain => scalar("effective_strain", |e| e.effective_strain),
+            Field::Strain => tensor("strain", |e| e.strain),
+            Field::Stress => tensor("stress_mpa", |e| e.stress_mpa),
             _ => None,
         }
     }
-}
-
-/// Equivalent stress of a stress tensor.
-fn von_mises([xx, yy, zz, yz, xz, xy]: [f64; 6]) -> f64 {
-    let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
-    (0.5 * normal + 3.0 * (yz * yz + xz * xz + xy * xy)).sqrt()
 }

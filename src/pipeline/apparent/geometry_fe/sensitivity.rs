@@ -79,7 +79,7 @@ pub fn of(
     let weights: f64 = samples.iter().map(weight).sum();
     let at_surface = samples.iter().map(|s| weight(s) * s.density).sum::<f64>() / weights;
     let of_element = |e: usize| {
-        let volume = model.shape(e).volume / model.factor(e);
+        let volume = model.volume_mm3(e);
         let density = model.mean_density_mpa(e, &model.strains(e, u));
         [volume, volume * density, volume * density * density]
     };

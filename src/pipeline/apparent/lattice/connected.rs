@@ -41,13 +41,11 @@ impl ConnectedModel {
 
 fn placed(lattice: &ConnectedLattice) -> Placed<'_> {
     let sites = &lattice.sites;
-    let bone: f64 = sites.fractions.iter().map(|&f| f64::from(f)).sum();
     Placed {
         frame: &sites.frame,
         indices: &sites.indices,
         grips: sites.grips,
         dropped: sites.dropped,
-        volume_mm3: bone * sites.frame.lp_mm.powi(3),
     }
 }
 
@@ -100,6 +98,7 @@ impl Discretisation for ConnectedModel {
             ConnectedSprings(&self.lattice),
             None::<Stress<ConnectedLattice>>,
             (&self.params, self.motion),
+            self.lattice.sites.bone_mm3(),
             None,
         )
     }

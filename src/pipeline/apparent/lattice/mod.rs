@@ -56,8 +56,6 @@ struct Placed<'a> {
     indices: &'a [[i32; 3]],
     grips: Grips,
     dropped: usize,
-    /// Of the sites' cells, or of the bone in them.
-    volume_mm3: f64,
 }
 
 impl<'a> Placed<'a> {
@@ -128,6 +126,7 @@ impl<'a> Placed<'a> {
         springs: C,
         goal: Option<Stress<'a, M>>,
         (params, motion): (&SolveParams, EndMotion),
+        volume_mm3: f64,
         places: Option<Places>,
     ) -> System<'a, O, C, Stress<'a, M>> {
         System {
@@ -142,7 +141,7 @@ impl<'a> Placed<'a> {
             load_steps: None,
             sites: self.indices.len(),
             dropped: self.dropped,
-            volume_mm3: self.volume_mm3,
+            volume_mm3,
             places,
         }
     }

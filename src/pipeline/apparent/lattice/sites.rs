@@ -47,14 +47,11 @@ impl SiteModel {
 
 fn placed(lattice: &Lattice) -> Placed<'_> {
     let sites = &lattice.sites;
-    let weights = sites.weights.as_ref();
-    let whole = weights.map_or(sites.len() as f64, |w| w.iter().sum());
     Placed {
         frame: &sites.frame,
         indices: &sites.indices,
         grips: sites.grips,
         dropped: sites.dropped,
-        volume_mm3: whole * sites.cell_mm3(),
     }
 }
 
@@ -126,6 +123,7 @@ impl Discretisation for SiteModel {
             Springs::new(&self.lattice),
             goal,
             (params, self.motion),
+            self.lattice.sites.volume_mm3(),
             places,
         )
     }

@@ -6,6 +6,12 @@ use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
 use crate::result::details::FailureAt;
 
+/// The one of the settings' own critical volume.
+pub fn chosen(failures: &[FailureAt], params: &SolveParams) -> Option<FailureAt> {
+    let own = params.pistoia?.critical_volume;
+    failures.iter().find(|f| f.critical_volume == own).cloned()
+}
+
 /// What a failure means of the load applied.
 pub fn at(
     failure: &Failure,

@@ -70,6 +70,14 @@ impl VoxelModel {
         })
     }
 
+    /// Two coarse cycles halve the iterations on bricks.
+    fn multigrid(&self) -> AmgParams {
+        AmgParams {
+            cycles: 2,
+            ..AmgParams::new(self.bricks.mesh().grid.spacing_mm)
+        }
+    }
+
     fn ends(&self) -> EndSites<'_> {
         let (mesh, grips) = (self.bricks.mesh(), self.grips);
         let h = mesh.grid.spacing_mm[grips.axis.index()];
@@ -143,10 +151,7 @@ impl Discretisation for VoxelModel {
         System {
             operator: &self.bricks,
             coarsen: &self.bricks,
-            multigrid: AmgParams {
-                cycles: 2,
-                ..AmgParams::new(mesh.grid.spacing_mm)
-            },
+            multigrid: self.multigrid(),
             goal: None::<NoGoal>,
             held: match loads {
                 LoadSet::Ends => supports::held(mesh, grips, motion, self.params.load),

@@ -70,18 +70,14 @@ impl<'a> Recorder<'a> {
     /// Fields and numbers, as far as the settings ask for them; fields on the grid of `scan` where the elements are of another.
     pub fn record(&self, scan: Option<&Volume<u8>>) -> Recorded {
         let table = self.failures();
-        let own = |f: &&FailureAt| {
-            let criterion = self.params.pistoia.map(|p| p.critical_volume);
-            criterion == Some(f.critical_volume)
-        };
         Recorded {
             fields: self.fields(scan),
-            failure: table.iter().find(own).cloned(),
+            failure: failure::chosen(&table, self.params),
             surface: (self.is_uniform && self.solved.plastic.is_none())
                 .then(|| self.surface())
                 .flatten(),
             note: None,
-            euler: [0; 2],
+            euler: None,
             sites: None,
             mesh: None,
             details: Details {

@@ -13,7 +13,7 @@ use crate::pipeline::apparent::discretisation::yielded::{Kept, Yielded};
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::VoxelModel;
-use crate::solver::amg::{Amg, AmgParams};
+use crate::solver::amg::Amg;
 use crate::solver::load_step::StepParams;
 
 /// Squared energy norm of the error left in a step, over its work and the tolerance of the solve: with it energies balance to 1e-6.
@@ -45,11 +45,7 @@ impl VoxelModel {
             }
         };
         let points = Points::new(mesh.grid.spacing_mm, true);
-        let multigrid = AmgParams {
-            cycles: 2,
-            ..AmgParams::new(mesh.grid.spacing_mm)
-        };
-        let preconditioner = Amg::new(&self.bricks, held, &multigrid);
+        let preconditioner = Amg::new(&self.bricks, held, &self.multigrid());
         let loading = Loading {
             held,
             elastic,

@@ -1,5 +1,31 @@
 //! `bonepd-ct`: from a μCT scan of trabecular bone to its apparent stiffness, with a stated error.
 //!
+//! Five entries: [`command::segment::segment`] (a scan to its mask), [`command::lattice::lattice`] (lattices of a mask),
+//! [`command::solve::solve`] (a mask to its moduli), [`command::report::report`] (solved scans to a page) and [`cohort::cohort`] (a
+//! recipe over many scans). [`command::scene::scene`] runs a scene in two dimensions. Settings are plain data with defaults.
+//!
+//! ```
+//! use bonepd_ct::command::{segment, solve};
+//! use bonepd_ct::machine::session::Session;
+//! use bonepd_ct::pipeline::apparent::SolveParams;
+//! use bonepd_ct::pipeline::lattice::LatticeParams;
+//! use bonepd_ct::pipeline::segment::SegmentParams;
+//! use bonepd_ct::result::settings::Method;
+//!
+//! # fn main() -> bonepd_ct::error::Result<()> {
+//! let out = std::env::temp_dir().join(format!("bonepd-ct-{}", std::process::id()));
+//! let session = Session { quiet: true, ..Session::default() };
+//! let threshold = SegmentParams { otsu: true, ..SegmentParams::default() };
+//! let scan = "sample_data/sparse.nii.gz".as_ref();
+//! segment::segment(scan, &out, None, &threshold, &session)?;
+//! let voxel_fe = SolveParams { method: Method::VoxelFe, young_mpa: 10_000.0, ..SolveParams::default() };
+//! let rows = solve::solve(&out, &LatticeParams::default(), &voxel_fe, &session)?;
+//! assert!(rows[0].e_app_mpa() > Some(0.0));
+//! # std::fs::remove_dir_all(out).ok();
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! Layers, lowest first. A file imports from lower layers only, or from its own folder;
 //! `tests/layers.rs` holds the code to it.
 //!

@@ -6,6 +6,7 @@ mod apparent;
 mod cli;
 mod cohort;
 mod dicom_series;
+mod examples;
 mod exports;
 mod extension;
 mod families;

@@ -287,7 +287,7 @@ fn start(args: &SolveArgs, session: &Session) -> SolveParams {
         return SolveParams::default();
     };
     session.say(format!(
-        "note: settings of the run ({}) are used; options here override them: {}",
+        "note: load, ends and tissue are those of the run ({}), where no option here sets them: {}. Method and resolution are not the run's",
         path.display(),
         run_settings::in_words(&params)
     ));

@@ -22,7 +22,6 @@ use crate::record::failures;
 use crate::record::failures::Failure;
 use crate::record::results;
 use crate::record::results::Results;
-use crate::result::answer::ScanFacts;
 use crate::result::row::Row;
 use indicatif::ProgressBar;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -141,7 +140,7 @@ impl Run<'_> {
                 let place = format!("{} ({} of {})", job.name, i + 1, self.jobs.len());
                 self.session.result(format!(
                     "{place}: {}{}",
-                    in_words(rows),
+                    in_words(rows, answer::line(&dir, rows).ok().flatten().as_ref()),
                     said_of_kept(rows, &before)
                 ));
             }
@@ -225,7 +224,7 @@ impl Run<'_> {
         } else {
             let recipe = self.write_recipe()?;
             let dirs = [self.out.to_path_buf()];
-            let answers = report::answers(&rows, &dirs, self.recipe.error);
+            let answers = report::answers(&rows, &dirs);
             table::write(&self.out.join(own_files::ANSWERS), &answers.lines)?;
             let sources = report::Sources {
                 rows: &rows,
@@ -244,11 +243,11 @@ impl Run<'_> {
             .zip(estimates)
             .zip(done.drain(..))
             .map(|((job, estimate), solved)| {
-                let facts = ScanFacts {
-                    target: self.recipe.error,
-                    ..answer::facts(&self.out.join(&job.name))
+                let answer = match &solved {
+                    Some(Ok(rows)) => answer::line(&self.out.join(&job.name), rows).ok().flatten(),
+                    _ => None,
                 };
-                result(job, *estimate, solved, &facts)
+                result(job, *estimate, solved, answer, self.recipe.error)
             })
             .collect();
         self.say_what_fell_short(&results);

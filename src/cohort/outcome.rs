@@ -5,7 +5,7 @@ use crate::command::estimate::Estimate;
 use crate::command::in_words::answer_in_words;
 use crate::command::{Outcome, adaptive};
 use crate::error::Result;
-use crate::result::answer::{AnswerLine, ScanFacts, best, line};
+use crate::result::answer::AnswerLine;
 use crate::result::row::Row;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -49,14 +49,14 @@ pub struct ScanResult {
     pub estimate: Estimate,
 }
 
-/// The answer, how many rows, and how many of them did not converge.
-pub(super) fn in_words(rows: &[Row]) -> String {
+/// The answer of the scan, how many rows were solved, and how many of them did not converge.
+pub(super) fn in_words(rows: &[Row], answer: Option<&AnswerLine>) -> String {
     let stalled = rows.iter().filter(|row| row.converged() == Some(false));
     let stalled = match stalled.count() {
         0 => String::new(),
         n => format!(", {n} not converged"),
     };
-    let answer = best(rows).map(|row| answer_in_words(&line(row, &ScanFacts::default())));
+    let answer = answer.map(answer_in_words);
     let plural = match rows.len() {
         1 => "",
         _ => "s",
@@ -82,22 +82,17 @@ pub(super) fn said_of_kept(rows: &[Row], before: &[Row]) -> &'static str {
     }
 }
 
-/// `facts` are what the scan's folder says; their target is the stated error asked for, if any.
+/// `target` is the relative error asked for, if any.
 pub(super) fn result(
     job: &ScanJob,
     estimate: Estimate,
     solved: Option<Result<Vec<Row>>>,
-    facts: &ScanFacts,
+    answer: Option<AnswerLine>,
+    target: Option<f64>,
 ) -> ScanResult {
     let missed = |rows: &[Row]| {
         let broken = rows.iter().all(Row::is_disconnected);
-        facts
-            .target
-            .is_some_and(|target| !broken && !adaptive::meets(rows, target))
-    };
-    let answer = match &solved {
-        Some(Ok(rows)) => best(rows).map(|row| line(row, facts)),
-        _ => None,
+        target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
     };
     let (state, error, rows) = match solved {
         Some(Ok(rows)) if missed(&rows) => (State::ErrorNotMet, None, rows.len()),

@@ -7,7 +7,6 @@ use crate::command::segment;
 use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
-use crate::result::answer::ScanFacts;
 use crate::result::cautions::cautions;
 use crate::result::row::Row;
 use crate::volume::Specimen;
@@ -50,11 +49,11 @@ pub(super) fn plan(
             Ok(e) => {
                 let (to, from) = (to.display(), job.input.display());
                 session.result(format!("{to} <- {from}: {e}"));
-                result(job, estimate, None, &ScanFacts::default())
+                result(job, estimate, None, None, None)
             }
             Err(e) => {
                 session.warn(format!("{} would fail: {e}", job.name));
-                result(job, estimate, Some(Err(e.clone())), &ScanFacts::default())
+                result(job, estimate, Some(Err(e.clone())), None, None)
             }
         });
         if let Some(free) = host::available_mib().filter(|free| *free < estimate.memory_mib) {

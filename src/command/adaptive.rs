@@ -8,7 +8,7 @@ mod strength;
 
 use crate::command::answer;
 use crate::command::estimate;
-use crate::command::in_words::in_words;
+use crate::command::in_words::{answer_in_words, in_words};
 use crate::command::ladder::{COARSENED, ONE_REFINEMENT, REFINED, smoothed_again, voxel_fe};
 use crate::command::solve::OpenScan;
 use crate::error::Result;
@@ -16,6 +16,7 @@ use crate::machine::session::Session;
 use crate::pipeline::apparent::{SolveParams, of_voxels};
 use crate::pipeline::lattice::LatticeParams;
 use crate::record::error_target_note::ErrorTargetNote;
+use crate::result::answer::{ScanFacts, line};
 use crate::result::row::Row;
 use crate::result::shape::{self, Image, Learnt, Stated};
 use std::path::Path;
@@ -139,6 +140,13 @@ impl Climb<'_> {
         };
         self.rows.iter_mut().for_each(put);
         self.scan.results().edit_rows(put)?;
+        let now = self.rows.iter().find(|other| other.key == row.key);
+        if let Some(now) = now.filter(|now| now.error_mpa() != row.error_mpa()) {
+            self.session.result(format!(
+                "{}  [all solves so far together: this error replaces the one above]",
+                in_words(now)
+            ));
+        }
         self.answer()
     }
 
@@ -229,7 +237,7 @@ fn finish(
             "cannot reach the error asked for, {}: the best is {} ({})",
             percent(target),
             percent(error),
-            in_words(row)
+            answer_in_words(&line(row, &ScanFacts::default()))
         )),
         None => {
             session.warn("no error could be stated: no solve converged, or the rows' notes say why")

@@ -1,18 +1,20 @@
 //! Owns what a scan's folder says of its answer: its facts, and `answer.json`.
 
 use crate::error::Result;
+use crate::io::own_files::RESULTS;
+use crate::io::table;
 use crate::record::answer::{self, Answer};
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
-use crate::result::answer::ScanFacts;
+use crate::result::answer::{AnswerLine, ScanFacts, answers};
+use crate::result::condition::{Condition, shared};
 use crate::result::row::Row;
 use std::path::Path;
 
-/// What segmentation and the last solve in `dir` left.
+/// What segmentation and the solves so far in `dir` left.
 pub fn facts(dir: &Path) -> ScanFacts {
-    let last = answer::read(dir);
     ScanFacts {
-        target: last.and_then(|a| a.target),
+        targets: answer::targets(dir),
         ..specimen::record(dir).map_or_else(ScanFacts::default, |record| of_record(&record))
     }
 }
@@ -26,19 +28,58 @@ fn of_record(record: &SegmentRecord) -> ScanFacts {
     }
 }
 
-/// Writes `answer.json` of the rows that one command solved in `dir`, and returns it. None, and nothing is written, where no row
-/// has a modulus, force or moment. `target` is the relative error asked for.
+/// Writes `answer.json` after one command solved `rows` in `dir`: of all rows there under their condition. None, and nothing is
+/// written, where no row has a modulus, force or moment. `target` is the relative error asked for; without one, that of an earlier command
+/// under the same condition holds.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// A file that cannot be read or written.
 pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answer>> {
-    let facts = ScanFacts {
-        target,
-        ..facts(dir)
+    let Some(condition) = condition(rows) else {
+        return Ok(None);
     };
-    let answer = answer::answer(rows, &facts);
+    let mut facts = facts(dir);
+    if let Some(target) = target {
+        for row in rows {
+            facts.targets.set(&Condition::of(&row.key), target);
+        }
+    }
+    let known = known(dir, rows, &condition)?;
+    let answer = answer::answer(&known, &facts);
     if let Some(answer) = &answer {
         answer::write(dir, answer)?;
     }
     Ok(answer)
+}
+
+/// The answer of the scan in `dir` under the condition of `rows`, which one command solved there.
+///
+/// # Errors
+/// A table that cannot be read.
+pub fn line(dir: &Path, rows: &[Row]) -> Result<Option<AnswerLine>> {
+    let Some(condition) = condition(rows) else {
+        return Ok(None);
+    };
+    let known = known(dir, rows, &condition)?;
+    Ok(answers(&known, &condition, |_| facts(dir)).pop())
+}
+
+/// The condition that the answer is of: of several one with a modulus, then the last.
+fn condition(rows: &[Row]) -> Option<Condition> {
+    let solved: Vec<&Row> = rows
+        .iter()
+        .filter(|row| row.load_carried().is_some())
+        .collect();
+    shared(&solved)
+}
+
+/// All rows in `dir` under the condition; `rows` where nothing is written there.
+fn known(dir: &Path, rows: &[Row], condition: &Condition) -> Result<Vec<Row>> {
+    let file = dir.join(RESULTS);
+    let mut known = match file.is_file() {
+        true => table::read(&file)?,
+        false => rows.to_vec(),
+    };
+    known.retain(|row: &Row| Condition::of(&row.key) == *condition);
+    Ok(known)
 }

@@ -15,8 +15,16 @@ pub fn in_words(row: &Row) -> String {
     let failure = solved.failure.map_or(String::new(), |f| failure(&f));
     let strength = strength(&solved.strength);
     let wall = solved.wall_s.map_or("NA".to_owned(), |t| format!("{t:.2}"));
+    let cost = match row.key.is_derived() {
+        true => String::new(),
+        false => format!(
+            " {:>9} sites {:>6} iterations {wall:>7} s",
+            solved.sites.unwrap_or(0),
+            solved.iterations.unwrap_or(0)
+        ),
+    };
     format!(
-        "{} {:<5} {:<12} {:>7} mm  {} {:>9} sites {:>6} iterations {wall:>7} s{failure}{strength}{}",
+        "{} {:<5} {:<12} {:>7} mm  {}{cost}{failure}{strength}{}",
         row.key.scan,
         row.key.structure.name(),
         row.key
@@ -24,8 +32,6 @@ pub fn in_words(row: &Row) -> String {
             .map_or("", |b| b.method_name(row.key.structure)),
         (row.key.lp_mm * 1e6).round() / 1e6,
         answered(row),
-        solved.sites.unwrap_or(0),
-        solved.iterations.unwrap_or(0),
         note(row),
     )
 }

@@ -26,7 +26,6 @@ use crate::record::specimen;
 use crate::result::cautions;
 use crate::result::derived::with_derived;
 use crate::result::details::Details;
-use crate::result::extrapolate::is_extrapolated;
 use crate::result::notes;
 use crate::result::row::{FailureLoad, Marks, Row};
 use crate::result::settings::{BoundaryRule, Settings};
@@ -197,7 +196,7 @@ impl OpenScan {
         }
         let known = self.results.solved();
         let all = with_derived(&rows, &known);
-        for row in all.iter().filter(|row| is_extrapolated(row)) {
+        for row in all.iter().filter(|row| row.key.is_derived()) {
             session.result(in_words(row));
         }
         warn_of_contradictions(&rows, &known, session);

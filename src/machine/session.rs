@@ -73,17 +73,14 @@ impl Session {
             return;
         };
         let warned = warned.lock().expect("no one panics while adding a line");
-        for alike in warned.groups() {
-            if let [_, others @ ..] = &alike.scans[..]
-                && !others.is_empty()
-            {
-                let names = shortened(others);
-                self.put(&format!(
-                    "warning: the same of {} more scans ({names}); of all: {}",
-                    others.len(),
-                    alike.of_all()
-                ));
-            }
+        let repeated = warned.groups().filter(|alike| alike.scans.len() > 1);
+        for alike in repeated {
+            self.put(&format!(
+                "warning: of {} scans ({}): {}",
+                alike.scans.len(),
+                shortened(&alike.scans),
+                alike.of_all()
+            ));
         }
     }
 

@@ -1,8 +1,9 @@
-//! Owns `answer.json`: the answer of a scan's last solve, of one condition.
+//! Owns `answer.json`: the answer of a scan under the condition of its last solve, and the errors asked for so far.
 
 use crate::error::Result;
 use crate::io::atomic;
 use crate::result::answer::found_by::FoundBy;
+use crate::result::answer::targets::Targets;
 use crate::result::answer::{AnswerLine, ScanFacts, best, line};
 use crate::result::condition::{Condition, shared};
 use crate::result::row::Row;
@@ -20,7 +21,7 @@ pub struct Answer {
     pub bv_tv: f64,
     pub e_app_mpa: Option<f64>,
     pub error_mpa: Option<f64>,
-    /// Relative error asked for.
+    /// Relative error asked for under these conditions.
     pub target: Option<f64>,
     pub met: Option<bool>,
     pub method: FoundBy,
@@ -54,9 +55,12 @@ pub struct Answer {
     pub note: Option<String>,
     /// Of all rows of the condition together.
     pub wall_s: Option<f64>,
+    /// Relative errors asked for, by conditions.
+    #[serde(default)]
+    pub targets: Targets,
 }
 
-/// The answer of the rows of one command; None where none has a modulus, force or moment.
+/// The answer of rows of one condition; None where none has a modulus, force or moment.
 pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
     let solved: Vec<&Row> = rows
         .iter()
@@ -105,17 +109,13 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         bv_tv,
         e_app_mpa,
         error_mpa,
-        target: facts.target,
+        target: facts.targets.of(&condition),
         met,
         method,
         element_mm,
         young_mpa,
         poisson,
-        conditions: format!(
-            "{} {}",
-            condition.load_in_words(),
-            condition.tissue_in_words()
-        ),
+        conditions: condition.in_words(),
         threshold_sensitivity,
         stiffness_n_per_mm,
         force_n,
@@ -129,6 +129,7 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         max_stress_error_mpa,
         note,
         wall_s: Some(wall_s.sum()),
+        targets: facts.targets.clone(),
     })
 }
 
@@ -138,8 +139,21 @@ pub fn write(dir: &Path, answer: &Answer) -> Result<()> {
     atomic::write(&dir.join(ANSWER), text + "\n")
 }
 
-/// What the last solve in `dir` left; None where there is nothing of this version.
-pub fn read(dir: &Path) -> Option<Answer> {
+/// The errors asked for in `dir` so far.
+pub fn targets(dir: &Path) -> Targets {
+    let Some(answer) = read(dir) else {
+        return Targets::default();
+    };
+    let mut targets = answer.targets;
+    // Older files have that of the last solve alone.
+    if let Some(target) = answer.target {
+        targets.set_in_words(answer.conditions, target);
+    }
+    targets
+}
+
+/// None where there is nothing of this version.
+fn read(dir: &Path) -> Option<Answer> {
     serde_json::from_slice(&std::fs::read(dir.join(ANSWER)).ok()?).ok()
 }
 

@@ -55,7 +55,6 @@ pub fn answers(rows: &[Row], facts: impl Fn(&str) -> ScanFacts) -> Answers {
     }
     let mut conditions = vec![condition.load_in_words(), condition.tissue_in_words()];
     conditions.extend(failure_in_words(&lines));
-    conditions.extend(laws_in_words(rows));
     conditions.extend(strength_in_words(&lines));
     conditions.extend(methods_in_words(&lines));
     Answers {
@@ -85,17 +84,6 @@ fn failure_in_words(lines: &[AnswerLine]) -> Option<String> {
     lines.iter().any(|line| line.failure_load_n.is_some()).then(|| {
         "Failure load: by Pistoia's criterion, the force at which a share of the bone (2 % unless set otherwise) exceeds an effective strain (0.007). It is proportional to the tissue modulus; no error of it is stated."
             .to_owned()
-    })
-}
-
-/// The laws by which tissue yields, as they were given.
-fn laws_in_words(rows: &[Row]) -> Option<String> {
-    let laws = distinct(rows.iter().filter_map(|row| row.key.plasticity.as_deref()));
-    (!laws.is_empty()).then(|| {
-        format!(
-            "Tissue that yields: {} (yield stresses, then hardening, in MPa).",
-            laws.join("; ")
-        )
     })
 }
 

@@ -231,7 +231,10 @@ fn bland_altman_percent(c: &Comparison) -> Figure {
     };
     if let Content::Curves(curves) = &mut figure.content {
         // In the colour of the points: limits have another.
-        curves.extend(fitted(0, &[means(c), differences]));
+        curves.extend(fitted(0, &[means(c), differences]).map(|line| Curve {
+            name: "line of least squares".to_owned(),
+            ..line
+        }));
     }
     figure
 }

@@ -110,6 +110,14 @@ pub fn groups(answers: &[&AnswerLine]) -> Groups {
         notes: notes(answers),
         ..Groups::default()
     };
+    let all = of_quantity(answers, &QUANTITIES[0]);
+    let single = all.iter().filter(|g| all.len() > 1 && g.members.len() == 1);
+    found.notes.extend(single.map(|group| {
+        format!(
+            "group {} has one subject only: it has no spread, and no test compares it",
+            group.name
+        )
+    }));
     for quantity in &QUANTITIES {
         let all = of_quantity(answers, quantity);
         for group in &all {

@@ -184,7 +184,11 @@ fn note(row: &Row) -> Option<(&str, String, String)> {
     Some((
         &row.key.scan,
         words,
-        format!("{structure} {} {} mm", model.name(), row.key.lp_mm),
+        format!(
+            "{structure} {} {} mm",
+            model.name(),
+            cells::length(row.key.lp_mm).text
+        ),
     ))
 }
 

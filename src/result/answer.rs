@@ -1,8 +1,10 @@
 //! Owns the answer of a scan: of the rows of one condition the one of the least stated error, as a line of `answers.csv`.
 
 pub mod found_by;
+pub mod targets;
 
 use crate::result::answer::found_by::FoundBy;
+use crate::result::answer::targets::Targets;
 use crate::result::condition::Condition;
 use crate::result::notes;
 use crate::result::row::Row;
@@ -52,8 +54,7 @@ pub struct AnswerLine {
 pub struct ScanFacts {
     /// Of the volume along x, y, z.
     pub size_mm: Option<[f64; 3]>,
-    /// Relative error asked for.
-    pub target: Option<f64>,
+    pub targets: Targets,
     /// Of the segmentation.
     pub warnings: Vec<String>,
 }
@@ -114,16 +115,14 @@ fn force_and_stiffness(row: &Row, facts: &ScanFacts) -> Option<[f64; 2]> {
 /// The line of a row.
 pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
     let key = &row.key;
-    let error = row.error_mpa();
     let forces = force_and_stiffness(row, facts);
     let mut note = row.marks.note.clone();
     for warning in &facts.warnings {
         notes::add(&mut note, &format!("warning: {warning}"));
     }
-    // What does not join the loaded faces has a modulus of 0 whatever the elements: a threshold alone can change that, so no
-    // error is stated and no target met or missed.
-    let is_disconnected = row.is_disconnected();
-    let relative = row.error().filter(|_| !is_disconnected);
+    // Of what does not join the loaded faces no error is stated, and no target is met or missed.
+    let target = facts.targets.of(&Condition::of(key));
+    let target = target.filter(|_| !row.is_disconnected());
     let answered = row.answered_error();
     let strength = row.solved.as_ref().map(|s| s.strength).unwrap_or_default();
     AnswerLine {
@@ -132,12 +131,9 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         group: row.marks.group.clone(),
         bv_tv: key.bv_tv,
         e_app_mpa: row.e_app_mpa(),
-        error_mpa: error.filter(|_| !is_disconnected),
-        error_percent: relative.map(|e| 100.0 * e),
-        met: facts
-            .target
-            .filter(|_| !is_disconnected)
-            .map(|target| answered.is_some_and(|e| e <= target)),
+        error_mpa: row.error_mpa(),
+        error_percent: row.error().map(|e| 100.0 * e),
+        met: target.map(|target| answered.is_some_and(|e| e <= target)),
         method: FoundBy::of(row),
         element_mm: key.lp_mm,
         young_mpa: key.young_mpa,
@@ -239,10 +235,13 @@ mod tests {
 
     fn answer_of(rows: &[Row]) -> AnswerLine {
         let condition = Condition::of(&rows[0].key);
-        let facts = |_: &str| ScanFacts {
-            size_mm: Some([2.0; 3]),
-            target: Some(0.05),
-            ..ScanFacts::default()
+        let facts = |_: &str| {
+            let mut facts = ScanFacts {
+                size_mm: Some([2.0; 3]),
+                ..ScanFacts::default()
+            };
+            facts.targets.set(&condition, 0.05);
+            facts
         };
         answers(rows, &condition, facts).remove(0)
     }

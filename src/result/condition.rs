@@ -16,6 +16,8 @@ pub struct Condition {
     pub grip_mm: f64,
     pub poisson: f64,
     pub tissue: Tissue,
+    /// The law by which tissue yields; None where it stays elastic.
+    pub plasticity: Option<String>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +45,13 @@ impl Condition {
                 Some(law) => Tissue::Law(law.clone()),
                 None => Tissue::Uniform(key.young_mpa),
             },
+            plasticity: key.plasticity.clone(),
         }
+    }
+
+    /// Load and tissue.
+    pub fn in_words(&self) -> String {
+        format!("{} {}", self.load_in_words(), self.tissue_in_words())
     }
 
     /// The load in a sentence.
@@ -115,8 +123,16 @@ impl Condition {
         ))
     }
 
-    /// The tissue in a sentence.
+    /// The tissue in sentences.
     pub fn tissue_in_words(&self) -> String {
+        let yields = match &self.plasticity {
+            Some(law) => format!(" It yields: {law} (yield stresses, then hardening, in MPa)."),
+            None => String::new(),
+        };
+        self.elasticity_in_words() + &yields
+    }
+
+    fn elasticity_in_words(&self) -> String {
         match &self.tissue {
             Tissue::Law(law) => format!(
                 "Tissue modulus by the law {law}, from voxel to voxel; Poisson's ratio {}.",
@@ -176,6 +192,13 @@ impl Condition {
             match &self.tissue {
                 Tissue::Law(law) => format!("tissue {law}"),
                 Tissue::Uniform(young) => format!("E {young} MPa"),
+            },
+        );
+        say(
+            self.plasticity != other.plasticity,
+            match &self.plasticity {
+                Some(law) => format!("yield {law}"),
+                None => "elastic tissue".to_owned(),
             },
         );
         words.join(", ")

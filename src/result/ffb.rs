@@ -57,7 +57,8 @@ fn only_one_carries(a: &Row, b: &Row) -> bool {
     carries(a) != carries(b)
 }
 
-/// Moduli are means, sites and times are sums, it is converged where both are; the rest is missing.
+/// The modulus is the mean, sites and times are sums, it is converged where both are; the rest is missing, as the checks by
+/// reaction and mean stress, which firm and floppy lattices do not share.
 fn mean_row(a: &Row, b: &Row) -> Row {
     let solved = a.solved.as_ref().zip(b.solved.as_ref());
     Row {
@@ -88,8 +89,8 @@ fn mean(a: &Solution, b: &Solution) -> Solution {
     Solution {
         sites: a.sites.zip(b.sites).map(|(x, y)| x + y),
         e_app_mpa: mean(a.e_app_mpa, b.e_app_mpa),
-        e_app_reaction_mpa: mean(a.e_app_reaction_mpa, b.e_app_reaction_mpa),
-        e_app_stress_mpa: mean(a.e_app_stress_mpa, b.e_app_stress_mpa),
+        // Of two errors that are halved and added, at most.
+        algebraic_error_mpa: mean(a.algebraic_error_mpa, b.algebraic_error_mpa),
         // Half the bracket.
         discretization_error_mpa: a
             .e_app_mpa
@@ -104,8 +105,7 @@ fn mean(a: &Solution, b: &Solution) -> Solution {
 fn without_moduli(mean: Solution) -> Solution {
     Solution {
         e_app_mpa: None,
-        e_app_reaction_mpa: None,
-        e_app_stress_mpa: None,
+        algebraic_error_mpa: None,
         discretization_error_mpa: None,
         ..mean
     }
@@ -119,7 +119,7 @@ fn both_converged(a: &Solution, b: &Solution) -> Option<bool> {
     }
 }
 
-/// A mean of an unconverged modulus must say so, and has the warnings of its parts.
+/// A mean of an unconverged modulus must say so. It has the warnings of its parts, and why both carry nothing.
 fn note(a: &Row, b: &Row) -> Option<String> {
     let mut note = None;
     let parts = || [a, b].into_iter();
@@ -137,9 +137,10 @@ fn note(a: &Row, b: &Row) -> Option<String> {
             "no mean: one of its lattices carries no load, so half of the other's modulus would be no estimate",
         );
     }
+    let are_apart = parts().all(Row::is_disconnected);
     let all = parts().flat_map(|row| notes::parts(row.marks.note.as_deref()));
-    let warnings = all.filter(|n| n.starts_with(WARNING));
-    warnings.for_each(|warning| notes::add(&mut note, warning));
+    let own = all.filter(|n| are_apart || n.starts_with(WARNING));
+    own.for_each(|words| notes::add(&mut note, words));
     note
 }
 
@@ -252,8 +253,12 @@ mod tests {
         assert_eq!(gap[2].e_app_mpa(), None);
         assert!(gap[0].is_disconnected());
         // No bone connects the faces: both are right.
-        let none = [BoundaryRule::Floppy, BoundaryRule::Firm].map(|b| row(b, 0.1, 0.0));
-        assert_eq!(with_ffb(&none, &[])[2].e_app_mpa(), Some(0.0));
+        let mut none = [BoundaryRule::Floppy, BoundaryRule::Firm].map(|b| row(b, 0.1, 0.0));
+        none[0].marks.note = Some("no path of bone".to_owned());
+        let mean = &with_ffb(&none, &[])[2];
+        assert_eq!((mean.e_app_mpa(), mean.error_mpa()), (Some(0.0), None));
+        let note = mean.marks.note.as_ref().unwrap();
+        assert!(note.contains("no path of bone"), "{note}");
     }
 
     #[test]

@@ -66,7 +66,10 @@ impl Alike {
             other.len() == first.len() && first.iter().zip(other).all(|(a, b)| a.may_be_merged(b))
         };
         if !others.iter().all(alike) {
-            return format!("{} (numbers of {})", self.first, self.scans[0]);
+            return format!(
+                "{} (numbers of {}, others differ)",
+                self.first, self.scans[0]
+            );
         }
         (0..first.len()).map(|at| range(&all, at)).collect()
     }
@@ -196,12 +199,18 @@ mod tests {
         lists.add("parameters 0.1, 0.12 mm", "a");
         lists.add("parameters 0.12 mm", "b");
         let found: Vec<String> = lists.groups().map(Alike::of_all).collect();
-        assert_eq!(found, ["parameters 0.1, 0.12 mm (numbers of a)"]);
+        assert_eq!(
+            found,
+            ["parameters 0.1, 0.12 mm (numbers of a, others differ)"]
+        );
         let mut names = Alikes::default();
         names.add("kept in c1/results.old.csv", "c1");
         names.add("kept in c2/results.old.csv", "c2");
         let found: Vec<String> = names.groups().map(Alike::of_all).collect();
-        assert_eq!(found, ["kept in c1/results.old.csv (numbers of c1)"]);
+        assert_eq!(
+            found,
+            ["kept in c1/results.old.csv (numbers of c1, others differ)"]
+        );
     }
 
     #[test]

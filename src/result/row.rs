@@ -113,10 +113,10 @@ impl Row {
     }
 
     /// Everything that is stated of the modulus, in MPa: algebraic, discretisation and shape error. None unless the last two
-    /// are known; 0 where no bone carries load.
+    /// are known. None where no bone joins the loaded faces: a threshold alone can change that.
     pub fn error_mpa(&self) -> Option<f64> {
         if self.is_disconnected() {
-            return Some(0.0);
+            return None;
         }
         let [algebraic, model] = self.stated_errors_mpa();
         Some(algebraic.unwrap_or(0.0) + model?)

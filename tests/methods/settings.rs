@@ -6,6 +6,7 @@ use bonepd_ct::measure::pistoia::Pistoia;
 use bonepd_ct::report::methods::{Criterion, Known, Segmented, Threshold, methods};
 use bonepd_ct::report::{ReportParams, answers, report};
 use bonepd_ct::result::answer::ScanFacts;
+use bonepd_ct::result::condition::Condition;
 use bonepd_ct::result::row::{FailureLoad, Row, Solution};
 use bonepd_ct::result::settings::{
     BoundaryRule, CellType, Conditions, Elements, Ends, Load, Method, Sed, Settings, Supports,
@@ -65,9 +66,12 @@ fn segmented(scan: &str) -> Segmented {
 }
 
 fn section(rows: &[Row], known: &Known) -> String {
-    let answers = answers::answers(rows, |_| ScanFacts {
-        target: known.target,
-        ..ScanFacts::default()
+    let answers = answers::answers(rows, |_| {
+        let mut facts = ScanFacts::default();
+        for (row, target) in rows.iter().zip(known.target) {
+            facts.targets.set(&Condition::of(&row.key), target);
+        }
+        facts
     });
     let report = report(rows, answers, &[], &ReportParams::default());
     methods(&report, known).markdown()

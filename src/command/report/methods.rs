@@ -7,7 +7,7 @@ use crate::pipeline::segment::Align;
 use crate::record::results;
 use crate::record::specimen::SegmentRecord;
 use crate::report::Report;
-use crate::report::methods::{Criterion, Known, Segmented, Threshold};
+use crate::report::methods::{Criterion, Known, Segmented, Threshold, condition};
 use std::path::PathBuf;
 
 /// What is known of the scans of `report` in `dirs`; `failed` further scans have no results.
@@ -17,13 +17,16 @@ pub(super) fn known(report: &Report, dirs: &[PathBuf], failed: usize) -> Known {
         failed,
         ..Known::default()
     };
+    let condition = condition(report);
     let mut targets: Vec<Option<f64>> = Vec::new();
     for line in &report.answers.lines {
         let Some((dir, record)) = folder(&line.scan, dirs) else {
             continue;
         };
         known.segmented.push(segmented(&record));
-        let target = answer::facts(&dir).target;
+        let target = condition
+            .as_ref()
+            .and_then(|condition| answer::facts(&dir).targets.of(condition));
         if !targets.contains(&target) {
             targets.push(target);
         }

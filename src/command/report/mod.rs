@@ -51,7 +51,7 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
         .map_or_else(ReportParams::default, |recipe| recipe.report);
     // Means of older programs do not say whether they are converged.
     let rows = with_ffb(&rows, &rows);
-    let answers = answers(&rows, dirs, None);
+    let answers = answers(&rows, dirs);
     let sources = Sources {
         rows: &rows,
         answers,
@@ -63,16 +63,10 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
     write(sources, out, session)
 }
 
-/// The answers of `rows`, with what the folders of the scans, under `dirs`, say of them. `target` is the relative error asked for;
-/// without it that of each scan's last solve.
-pub fn answers(rows: &[Row], dirs: &[PathBuf], target: Option<f64>) -> Answers {
+/// The answers of `rows`, with what the folders of the scans, under `dirs`, say of them.
+pub fn answers(rows: &[Row], dirs: &[PathBuf]) -> Answers {
     answers::answers(rows, |scan| {
-        let facts =
-            folder(scan, dirs).map_or_else(ScanFacts::default, |(dir, _)| answer::facts(&dir));
-        ScanFacts {
-            target: target.or(facts.target),
-            ..facts
-        }
+        folder(scan, dirs).map_or_else(ScanFacts::default, |(dir, _)| answer::facts(&dir))
     })
 }
 

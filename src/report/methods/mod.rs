@@ -14,7 +14,9 @@ use crate::measure::pistoia::Pistoia;
 use crate::report::Report;
 use crate::result::answer::AnswerLine;
 use crate::result::answer::found_by::FoundBy;
+use crate::result::cautions::WARNING;
 use crate::result::condition::{Condition, shared};
+use crate::result::notes::{Alikes, parts};
 use crate::result::row::Row;
 use serde::Serialize;
 
@@ -104,14 +106,20 @@ pub(crate) struct Answered<'a> {
     pub row: &'a Row,
 }
 
+fn solved(report: &Report) -> Vec<&Row> {
+    let rows = report.rows.iter();
+    rows.filter(|row| row.load_carried().is_some()).collect()
+}
+
+/// The condition that the section describes; None where nothing was solved.
+pub fn condition(report: &Report) -> Option<Condition> {
+    shared(&solved(report))
+}
+
 /// The methods section of `report`; empty where nothing was solved.
 pub fn methods(report: &Report, known: &Known) -> Methods {
-    let solved: Vec<&Row> = report
-        .rows
-        .iter()
-        .filter(|row| row.load_carried().is_some())
-        .collect();
-    let Some(condition) = shared(&solved) else {
+    let solved = solved(report);
+    let Some(condition) = condition(report) else {
         return Methods::default();
     };
     let answered = answered(report, &condition);
@@ -167,6 +175,10 @@ fn to_add(report: &Report, known: &Known, condition: &Condition) -> Vec<String> 
         "Why this threshold: how it was chosen and checked.".to_owned(),
     ];
     add.extend(model::source_of(condition));
+    add.extend(
+        cautions(report)
+            .map(|caution| format!("What this warning means for the study: {caution}.")),
+    );
     let unknown: Vec<&str> = (report.answers.lines.iter())
         .map(|line| line.scan.as_str())
         .filter(|scan| known.segmented.iter().all(|s| s.scan != *scan))
@@ -178,6 +190,25 @@ fn to_add(report: &Report, known: &Known, condition: &Condition) -> Vec<String> 
         ));
     }
     add
+}
+
+/// Warnings of the answers, one line a matter.
+fn cautions(report: &Report) -> impl Iterator<Item = String> {
+    let mut found = Alikes::default();
+    for line in &report.answers.lines {
+        let warnings = parts(line.note.as_deref()).filter_map(|part| part.strip_prefix(WARNING));
+        for warning in warnings {
+            found.add(warning, &line.scan);
+        }
+    }
+    let words: Vec<String> = found
+        .groups()
+        .map(|group| {
+            let names: Vec<&str> = group.scans.iter().map(String::as_str).collect();
+            format!("{} ({})", group.of_all(), words::scans(&names))
+        })
+        .collect();
+    words.into_iter()
 }
 
 impl Methods {

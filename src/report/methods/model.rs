@@ -1,7 +1,7 @@
 //! Owns what a methods section says of models and tissue.
 
 use super::Answered;
-use super::words::{list, scans, setting, settings};
+use super::words::{by_scan, list, scans, setting, settings, size};
 use crate::discretisation::lattice::stencil::Structure;
 use crate::physics::hex8::element::{FULL_POISSON, MEAN_POISSON};
 use crate::report::{Report, distinct};
@@ -27,10 +27,35 @@ pub fn text(report: &Report, answered: &[Answered]) -> String {
         text += &model(report, &rows);
         text.push(' ');
     }
+    text += &other_sizes(report, answered);
     if rows_of_others(report, answered) {
         text += "Results of further models are in results.csv; they are not the answers described here.";
     }
     text.trim_end().to_owned()
+}
+
+/// Further sizes that the models of the answers were solved with; empty where there are none.
+fn other_sizes(report: &Report, answered: &[Answered]) -> String {
+    let model = |row: &Row| {
+        let key = &row.key;
+        (key.method, key.structure, key.boundary, key.elements)
+    };
+    let is_other = |row: &&Row| {
+        let own = answered.iter().find(|a| a.row.key.scan == row.key.scan);
+        own.is_some_and(|a| {
+            model(a.row) == model(row)
+                && a.row.key.without_discretisation() == row.key.without_discretisation()
+                && a.row.key.lp_mm != row.key.lp_mm
+        })
+    };
+    let sizes = report.rows.iter().filter(is_other);
+    let sizes = settings(sizes.map(|row| size(row.key.lp_mm)));
+    match sizes.is_empty() {
+        true => String::new(),
+        false => format!(
+            "The same model was also solved with {sizes} mm; of these solves the converged one with the smallest stated error is the answer. "
+        ),
+    }
 }
 
 /// Whether rows of the scans stand for other models than those that answer, or lead to them.
@@ -50,9 +75,12 @@ fn rows_of_others(report: &Report, answered: &[Answered]) -> bool {
 /// The model of rows that differ in scan and size only.
 fn model(report: &Report, rows: &[&Row]) -> String {
     let key = &rows[0].key;
-    let sizes = settings(rows.iter().map(|row| row.key.lp_mm));
+    let of_scans = |what: &str| {
+        let says = |row: &&Row| Some(format!("{what} was {} mm", setting(size(row.key.lp_mm))));
+        by_scan(rows, |row| &row.key.scan, says)
+    };
     match (key.method, key.boundary) {
-        (Method::Lattice, Some(boundary)) => lattice(report, rows, boundary, &sizes),
+        (Method::Lattice, Some(boundary)) => lattice(report, rows, boundary),
         (Method::VoxelFe, boundary) => {
             let dilatation = integration(rows[0].key.poisson);
             let limit = match boundary {
@@ -65,17 +93,20 @@ fn model(report: &Report, rows: &[&Row]) -> String {
                 _ => String::new(),
             };
             format!(
-                "{} The edge of an element was {sizes} mm. {dilatation}{limit}",
-                bricks(key.elements)
+                "{}{} {dilatation}{limit}",
+                bricks(key.elements),
+                of_scans("The edge of an element")
             )
         }
         (Method::GeometryFe, _) => format!(
-            "{} The edge of the cells that the elements were made in was {sizes} mm.",
-            tetrahedra(key.elements)
+            "{}{}",
+            tetrahedra(key.elements),
+            of_scans("The edge of the cells that the elements were made in")
         ),
         (method, _) => format!(
-            "Bone was represented by the method {} with a cell of {sizes} mm.",
-            method.name()
+            "Bone was represented by the method {}.{}",
+            method.name(),
+            of_scans("The size of a cell")
         ),
     }
 }
@@ -125,7 +156,7 @@ fn tetrahedra(elements: Option<Elements>) -> &'static str {
     }
 }
 
-fn lattice(report: &Report, rows: &[&Row], boundary: BoundaryRule, sizes: &str) -> String {
+fn lattice(report: &Report, rows: &[&Row], boundary: BoundaryRule) -> String {
     let structure = rows[0].key.structure;
     let name = match structure {
         CellType::Lattice(Structure::Sc) => "simple cubic",
@@ -135,7 +166,10 @@ fn lattice(report: &Report, rows: &[&Row], boundary: BoundaryRule, sizes: &str) 
     };
     let lattices = match boundary {
         BoundaryRule::Extrapolated => format!("lattice parameters of {} mm", behind(report, rows)),
-        _ => format!("a lattice parameter of {sizes} mm"),
+        _ => format!(
+            "a lattice parameter of {} mm",
+            settings(rows.iter().map(|row| size(row.key.lp_mm)))
+        ),
     };
     let thickness = rows.iter().filter_map(|row| row.marks.mean_thickness_mm);
     let thickness: Vec<f64> = thickness.collect();
@@ -190,7 +224,7 @@ fn behind(report: &Report, rows: &[&Row]) -> String {
             .rows
             .iter()
             .filter(leads)
-            .map(|row| setting(row.key.lp_mm)),
+            .map(|row| setting(size(row.key.lp_mm))),
     );
     list(&sizes)
 }

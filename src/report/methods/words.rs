@@ -19,6 +19,11 @@ pub fn setting(v: f64) -> String {
     }
 }
 
+/// A size of elements or lattices in mm, without the digits of a voxel that was divided by a whole number.
+pub fn size(mm: f64) -> f64 {
+    (mm * 1e5).round() / 1e5
+}
+
 /// A result, to three digits.
 pub fn result(v: f64) -> String {
     let magnitude = match v == 0.0 {

@@ -76,6 +76,40 @@ fn one_line_a_scan_with_one_plus_minus() {
 }
 
 #[test]
+fn a_coarser_solve_later_does_not_replace_the_answer() {
+    let (dir, scans, recipe) = cohort(1);
+    let out = dir.path().join("out");
+    let (recipe, scans) = (text(&recipe), text(&scans));
+    let target = ["run", recipe, scans, "-o", text(&out), "--error", "40%"];
+    assert!(run(&target).0 <= 1);
+    let scan = out.join("s1");
+    let before = answer::read(&scan).unwrap();
+    let (code, said, _) = run(&["solve", text(&scan), "--lp", "0.15"]);
+    assert_eq!(code, 0);
+    assert!(said.contains(" ffb "), "{said}");
+    let after = answer::read(&scan).unwrap();
+    assert_eq!(after.conditions, before.conditions);
+    assert_eq!(
+        (after.e_app_mpa, after.method, after.target, after.met),
+        (before.e_app_mpa, before.method, Some(0.4), before.met)
+    );
+    let report = out.join("again");
+    assert_eq!(run(&["report", text(&out), "-o", text(&report)]).0, 0);
+    let again: Vec<AnswerLine> = table::read(&report.join("answers.csv")).unwrap();
+    assert_eq!(
+        (again[0].e_app_mpa, again[0].met),
+        (before.e_app_mpa, before.met)
+    );
+    // Other conditions have no target; what was asked for of the first stays.
+    let sideways = ["solve", text(&scan), "--lp", "0.15", "--axis", "x"];
+    assert_eq!(run(&sideways).0, 0);
+    let other = answer::read(&scan).unwrap();
+    assert_eq!((other.target, other.met), (None, None));
+    assert_eq!(run(&sideways[..4]).0, 0);
+    assert_eq!(answer::read(&scan).unwrap().met, before.met);
+}
+
+#[test]
 fn groups_are_compared_over_subjects() {
     let (dir, _scans, recipe) = cohort(6);
     let manifest = dir.path().join("cohort.csv");

@@ -82,7 +82,10 @@ fn a_run_by_voxels_says_its_settings() {
 #[test]
 fn a_target_and_other_methods_are_said() {
     let said = methods("[segment]\nlower = 500.0\n", &["--error", "40%"]);
-    has(&said, &["exceeded 40 %; this target was met on"]);
+    has(
+        &said,
+        &["The target of the stated error was 40 %; it was met on"],
+    );
 }
 
 /// `report` on one solved scan: the settings of the solve, not those of a recipe.

@@ -152,8 +152,8 @@ pub fn targets(dir: &Path) -> Targets {
     targets
 }
 
-/// None where there is nothing of this version.
-fn read(dir: &Path) -> Option<Answer> {
+/// What the last solve in `dir` left; None where there is nothing of this version.
+pub fn read(dir: &Path) -> Option<Answer> {
     serde_json::from_slice(&std::fs::read(dir.join(ANSWER)).ok()?).ok()
 }
 

@@ -66,10 +66,12 @@ macro_rules! portable {
             }
             #[inline(always)]
             unsafe fn load(p: *const $s) -> Self {
+                // SAFETY: by the contract of `Lanes` `p` is valid for reads of eight scalars; the read asks for no alignment.
                 $name(unsafe { p.cast::<[$s; 8]>().read_unaligned() })
             }
             #[inline(always)]
             unsafe fn store(self, p: *mut $s) {
+                // SAFETY: by the contract of `Lanes` `p` is valid for writes of eight scalars; the write asks for no alignment.
                 unsafe { p.cast::<[$s; 8]>().write_unaligned(self.0) }
             }
             #[inline(always)]

@@ -5,7 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 /// # Safety
 /// Methods may be called only where the implementation's instruction set is available; pointers must be valid for three
-/// scalars. The fourth lane is zero after `load`, and stays what arithmetic makes of zeros.
+/// scalars and aligned to one. The fourth lane is zero after `load`, and stays what arithmetic makes of zeros.
 #[allow(clippy::missing_safety_doc)] // one contract for all methods, above
 pub trait Vec3Lanes: Copy {
     type S: Copy;
@@ -88,6 +88,7 @@ macro_rules! plain {
             }
             #[inline(always)]
             unsafe fn load(p: *const $s) -> Self {
+                // SAFETY: by the contract of `Vec3Lanes` `p` is valid for reads of three scalars and aligned to one, as `[$s; 3]` is.
                 $name(unsafe { *p.cast() })
             }
             #[inline(always)]
@@ -96,6 +97,7 @@ macro_rules! plain {
             }
             #[inline(always)]
             unsafe fn store(self, p: *mut $s) {
+                // SAFETY: by the contract of `Vec3Lanes` `p` is valid for writes of three scalars and aligned to one, as `[$s; 3]` is.
                 unsafe { *p.cast() = self.0 }
             }
             #[inline(always)]
@@ -149,47 +151,61 @@ mod avx2 {
                 type S = $s;
                 #[inline(always)]
                 unsafe fn zero() -> Self {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA; no memory is read or written.
                     unsafe { $name($zero()) }
                 }
                 #[inline(always)]
                 unsafe fn splat(s: $s) -> Self {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA; no memory is read or written.
                     unsafe { $name($splat(s)) }
                 }
                 #[inline(always)]
                 unsafe fn load(p: *const $s) -> Self {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA, and `p` is valid for reads of three scalars: the mask leaves
+                    // the fourth unread.
                     unsafe { $name($load(p, $mask)) }
                 }
                 #[inline(always)]
                 unsafe fn constant(p: &[$s; 4]) -> Self {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA; `p` is an array of the four scalars that the load reads, at any
+                    // alignment.
                     unsafe { $name($constant(p.as_ptr())) }
                 }
                 #[inline(always)]
                 unsafe fn store(self, p: *mut $s) {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA, and `p` is valid for writes of three scalars: the mask leaves
+                    // the fourth unwritten.
                     unsafe { $store(p, $mask, self.0) }
                 }
                 #[inline(always)]
                 unsafe fn add(self, b: Self) -> Self {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA; no memory is read or written.
                     unsafe { $name($add(self.0, b.0)) }
                 }
                 #[inline(always)]
                 unsafe fn sub(self, b: Self) -> Self {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA; no memory is read or written.
                     unsafe { $name($sub(self.0, b.0)) }
                 }
                 #[inline(always)]
                 unsafe fn fma(self, a: Self, b: Self) -> Self {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA; no memory is read or written.
                     unsafe { $name($fma(a.0, b.0, self.0)) }
                 }
                 #[inline(always)]
                 unsafe fn turn(self) -> Self {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA; no memory is read or written.
                     unsafe { $name($turn(self.0)) }
                 }
                 #[inline(always)]
                 unsafe fn turn_back(self) -> Self {
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA; no memory is read or written.
                     unsafe { $name($turn_back(self.0)) }
                 }
                 #[inline(always)]
                 unsafe fn sum(self) -> $s {
                     let mut lanes = [0.0; 3];
+                    // SAFETY: by the contract of `Vec3Lanes` the processor has AVX2 and FMA; `lanes` has room for the three scalars of a store.
                     unsafe { self.store(lanes.as_mut_ptr()) };
                     lanes[0] + lanes[1] + lanes[2]
                 }

@@ -154,10 +154,11 @@ impl Padded {
     }
 
     fn block(&self, at: usize, spread: &Spread, weight: Weight) -> [PointState; LANES] {
-        // SAFETY: the processor has the instructions that `isa` reports.
         #[cfg(target_arch = "x86_64")]
         match isa() {
+            // SAFETY: `isa` reports this only where the processor has AVX-512F, AVX2 and FMA, all that the function asks for.
             Isa::Avx512 => return unsafe { block_avx512(self, at, spread, weight) },
+            // SAFETY: `isa` reports this only where the processor has AVX2 and FMA, all that the function asks for.
             Isa::Avx2 => return unsafe { block_avx2(self, at, spread, weight) },
             Isa::Portable => {}
         }

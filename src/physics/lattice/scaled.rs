@@ -111,9 +111,10 @@ impl<S: Precision> Scaled<S> {
             neighbours: &sites.neighbours,
         };
         let weights = self.weights.as_deref();
-        assert!(sites.neighbours.len() == sites.len());
+        assert!(sites.neighbours.len() == sites.len() && range.end <= sites.len());
         assert!(weights.is_none_or(|w| w.len() == sites.len()));
-        // SAFETY: `isa` vouches for the instruction set, `Neighbours` for ends below its length, callers for the rest.
+        // SAFETY: `isa` vouches for the instruction set, `Neighbours` for ends below its length; the assertions above hold
+        // the range and the weights to the number of sites, those of the methods that make a task its fields.
         unsafe {
             match sites.frame.structure {
                 Structure::Sc => on_this_processor::<Sc, S>(bonds, weights, range, task),

@@ -135,6 +135,7 @@ unsafe fn add_transposed<N: Lanes<S = f32>, const D: usize>(
     a: &Modes<D>,
     b: &Modes<D>,
 ) {
+    // SAFETY: the caller vouches for the instruction set; rows of `Wide` and of `Modes` are arrays of eight scalars.
     unsafe {
         let b: [N; D] = std::array::from_fn(|k| N::load(b[k].as_ptr()));
         for r in 0..6 {

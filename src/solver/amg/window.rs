@@ -236,6 +236,7 @@ pub unsafe fn add_product<N: Lanes<S = f32>, const D: usize>(
     a: &[[f32; D]; D],
     b: &Modes<D>,
 ) {
+    // SAFETY: the caller vouches for the instruction set; rows of `Modes` are arrays of eight scalars.
     unsafe {
         let b: [N; D] = std::array::from_fn(|k| N::load(b[k].as_ptr()));
         for r in 0..D {

@@ -17,26 +17,38 @@ pub const ADVICE: &str = "\n  what to do: ";
 pub enum Error {
     /// A file or folder that cannot be read, understood or written.
     File {
+        /// The file or folder.
         path: PathBuf,
+        /// What was expected and what was there.
         found: String,
+        /// What to do.
         advice: String,
+        /// The error of another library behind this one, if any.
         source: Option<Source>,
     },
     /// A setting (flag, recipe key or parameter) with an unusable value.
     Setting {
+        /// The key, as in a recipe.
         key: String,
+        /// What is wrong with its value.
         found: String,
+        /// What to do.
         advice: String,
+        /// The error of another library behind this one, if any.
         source: Option<Source>,
     },
     /// A specimen or scene for which the request makes no sense.
     Specimen {
+        /// What does not fit.
         found: String,
+        /// What to do.
         advice: String,
+        /// The error of another library behind this one, if any.
         source: Option<Source>,
     },
 }
 
+/// A result with this crate's error.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl fmt::Display for Error {
@@ -80,6 +92,7 @@ impl Error {
         }
     }
 
+    /// `key` as in a recipe; `found` says what is wrong with its value; `advice` what to do.
     pub fn setting(
         key: impl Into<String>,
         found: impl Into<String>,
@@ -93,6 +106,7 @@ impl Error {
         }
     }
 
+    /// `found` says what of the specimen does not fit the request; `advice` what to do.
     pub fn specimen(found: impl Into<String>, advice: impl Into<String>) -> Self {
         Error::Specimen {
             found: found.into(),

@@ -6,8 +6,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
 #[serde(rename_all = "lowercase")]
 pub enum Axis {
+    /// Along a row of voxels: the fastest index.
     X,
+    /// From row to row.
     Y,
+    /// From slice to slice.
     #[default]
     Z,
 }
@@ -18,6 +21,7 @@ impl Axis {
         self as usize
     }
 
+    /// `x`, `y` or `z`.
     pub fn name(self) -> &'static str {
         ["x", "y", "z"][self.index()]
     }
@@ -26,11 +30,14 @@ impl Axis {
 /// `n` voxels of size `spacing_mm` along x, y, z; the first voxel's outer corner is the origin.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
+    /// Voxels along x, y, z.
     pub n: [usize; 3],
+    /// Edges of a voxel along x, y, z.
     pub spacing_mm: [f64; 3],
 }
 
 impl Grid {
+    /// From the number of voxels and their edges along x, y, z.
     pub fn new(n: [usize; 3], spacing_mm: [f64; 3]) -> Self {
         Grid { n, spacing_mm }
     }
@@ -40,6 +47,7 @@ impl Grid {
         self.n.iter().product()
     }
 
+    /// Whether there are no voxels.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

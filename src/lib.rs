@@ -4,6 +4,9 @@
 //! [`command::solve::solve`] (a mask to its moduli), [`command::report::report`] (solved scans to a page) and [`cohort::cohort`] (a
 //! recipe over many scans). [`command::scene::scene`] runs a scene in two dimensions. Settings are plain data with defaults.
 //!
+//! What these pages show is the library's interface. Modules and items that they hide (`#[doc(hidden)]`) are the parts that the program is
+//! made of: public for its command line and its tests only, and free to change in any version.
+//!
 //! ```
 //! use bonepd_ct::command::{segment, solve};
 //! use bonepd_ct::machine::session::Session;
@@ -47,26 +50,42 @@
 
 pub mod cohort;
 pub mod command;
+#[doc(hidden)]
 pub mod discretisation;
+#[doc(hidden)]
 pub mod draw;
 pub mod error;
+#[doc(hidden)]
 pub mod export;
+#[doc(hidden)]
 pub mod format;
 pub mod grid;
+#[doc(hidden)]
 pub mod image;
+#[doc(hidden)]
 pub mod io;
 pub mod machine;
+#[doc(hidden)]
 pub mod mask;
+#[doc(hidden)]
 pub mod measure;
+#[doc(hidden)]
 pub mod operator;
+#[doc(hidden)]
 pub mod par;
+#[doc(hidden)]
 pub mod physics;
 pub mod pipeline;
 pub mod recipe;
+#[doc(hidden)]
 pub mod record;
+#[doc(hidden)]
 pub mod report;
 pub mod result;
+#[doc(hidden)]
 pub mod scene;
+#[doc(hidden)]
 pub mod simd;
+#[doc(hidden)]
 pub mod solver;
 pub mod volume;

@@ -9,11 +9,11 @@ use crate::pipeline::apparent::checks::needs_modulus;
 use crate::pipeline::apparent::{Load, SolveParams};
 use crate::pipeline::lattice::LatticeParams;
 use crate::pipeline::segment::SegmentParams;
-use crate::report::ReportParams;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;
 
+pub use crate::report::ReportParams;
 pub use built_in::{BUILT_IN, SCENES, built_in};
 
 /// Settings of a whole run. What a file leaves out takes its default.
@@ -26,9 +26,13 @@ pub struct Recipe {
     pub error: Option<f64>,
     /// Loads of every scan, each a solve of its own with all else of `[solve]`; that of `[solve]` alone where there are none.
     pub loads: Vec<Load>,
+    /// Table `[segment]`.
     pub segment: SegmentParams,
+    /// Table `[lattice]`.
     pub lattice: LatticeParams,
+    /// Table `[solve]`.
     pub solve: SolveParams,
+    /// Table `[report]`.
     pub report: ReportParams,
 }
 

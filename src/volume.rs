@@ -6,7 +6,9 @@ use ndarray::Array3;
 /// Values on a voxel grid. `values` has shape `(nz, ny, nx)` in standard layout: x is fastest.
 #[derive(Debug, Clone)]
 pub struct Volume<T> {
+    /// Number and size of the voxels.
     pub grid: Grid,
+    /// One value a voxel.
     pub values: Array3<T>,
     /// Rows of the voxel-to-world affine (mm) where the file gave one; None: axes as stored, origin at zero.
     pub affine: Option<[[f64; 4]; 3]>,
@@ -67,6 +69,7 @@ impl<T> Volume<T> {
 /// A segmented scan: which voxels are bone, and of what total volume.
 #[derive(Debug, Clone)]
 pub struct Specimen {
+    /// Name of the scan.
     pub name: String,
     /// 1 where bone, 0 elsewhere.
     pub bone: Volume<u8>,
@@ -86,6 +89,7 @@ pub struct Specimen {
 pub struct Threshold {
     /// Bone lies in `lower..=upper`.
     pub lower: f32,
+    /// The upper end of that window.
     pub upper: f32,
     /// 1 inside the volume of interest; None: the whole grid.
     pub inside: Option<Volume<u8>>,
@@ -112,6 +116,7 @@ impl Specimen {
         voxels as f64 * self.bone.grid.voxel_mm3()
     }
 
+    /// Bone volume fraction, 0 to 1.
     pub fn bv_tv(&self) -> f64 {
         self.bv_mm3() / self.tv_mm3
     }

@@ -1,5 +1,11 @@
 //! One test program. Each module is one subject.
 
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    reason = "tests are no interface, and an unwrap that fails is a test that fails"
+)]
+
 mod accuracy;
 mod answers;
 mod apparent;

@@ -22,6 +22,7 @@ pub fn names(out: &Path, jobs: &[ScanJob]) -> Vec<String> {
     names
 }
 
+/// Says that these scans stay in the tables and the report; nothing where there are none.
 pub fn say(names: &[String], session: &Session) {
     if !names.is_empty() {
         session.say(format!(

@@ -24,6 +24,7 @@ const COLUMNS: [&str; 9] = [
 /// What a manifest lists.
 #[derive(Debug)]
 pub struct Manifest {
+    /// The scans, in the order of the lines.
     pub jobs: Vec<ScanJob>,
     /// Columns that mean nothing here, age and the like.
     pub unused: Vec<String>,

@@ -1,10 +1,12 @@
 //! Owns `run`: one recipe over scans and folders of scans, each scan on its own.
 
+#[doc(hidden)]
 pub mod earlier;
 pub mod job;
 pub mod manifest;
 pub mod outcome;
 mod plan;
+#[doc(hidden)]
 pub mod queue;
 pub mod scans;
 

@@ -14,11 +14,15 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
+    /// Solved: everything converged, and the error asked for is met.
     Done,
+    /// At least one row did not converge; rows are written and marked.
     #[serde(rename = "not converged")]
     NotConverged,
+    /// Rows are written, and their stated error is larger than the one asked for.
     #[serde(rename = "error not met")]
     ErrorNotMet,
+    /// No results; `error` says why.
     Failed,
     /// In a dry run.
     Planned,
@@ -39,13 +43,19 @@ impl State {
 /// One scan of a run.
 #[derive(Debug, Clone, Serialize)]
 pub struct ScanResult {
+    /// Name of the scan.
     pub scan: String,
+    /// Path of the scan.
     pub input: PathBuf,
+    /// How it ended.
     pub state: State,
+    /// The message of a scan that failed; None for all others.
     pub error: Option<String>,
+    /// Number of rows in its table, those that follow from others among them.
     pub rows: usize,
     /// None where nothing was solved.
     pub answer: Option<AnswerLine>,
+    /// What it was expected to take.
     pub estimate: Estimate,
 }
 

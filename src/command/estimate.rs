@@ -34,6 +34,7 @@ const BUILT: f64 = 40.0 / 115.0;
 pub struct Estimate {
     /// None where the header does not say.
     pub voxels: Option<[usize; 3]>,
+    /// Memory at the highest, in MiB.
     pub memory_mib: f64,
     /// None where the voxel size is not known before reading.
     pub time_s: Option<f64>,
@@ -180,6 +181,7 @@ fn kept_bytes(specimen: &Specimen, params: &SolveParams) -> f64 {
 ///
 /// # Errors
 /// A lattice that needs more than is free.
+#[doc(hidden)]
 pub fn refuse_lattice_that_does_not_fit(
     job: &Job,
     prepared: Prepared,
@@ -193,6 +195,7 @@ pub fn refuse_lattice_that_does_not_fit(
 ///
 /// # Errors
 /// A solve that needs more than is free.
+#[doc(hidden)]
 pub fn refuse_what_does_not_fit(job: &Job, prepared: Prepared, params: &SolveParams) -> Result<()> {
     let Some(free) = host::available_mib() else {
         return Ok(());
@@ -210,6 +213,7 @@ pub fn refuse_what_does_not_fit(job: &Job, prepared: Prepared, params: &SolvePar
 ///
 /// # Errors
 /// Settings that do not fit the specimen, a solve that needs more than is free.
+#[doc(hidden)]
 pub fn of_solve_mib(job: &Job, prepared: Prepared, params: &SolveParams) -> Result<f64> {
     let cost = needed(job, prepared, params)?;
     let [bytes, _] = cost.bytes;

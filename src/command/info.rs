@@ -1,7 +1,8 @@
 //! Owns `info`: what is known of a scan, without segmenting it.
 
 use crate::error::Result;
-use crate::format::calibration::{Calibration, GreyUnit};
+pub use crate::format::calibration::Calibration;
+use crate::format::calibration::GreyUnit;
 use crate::format::orient::Turn;
 use crate::image::array::headerless::Contents;
 use crate::image::scan;
@@ -13,17 +14,23 @@ use std::path::Path;
 /// What a scan's file says, and what its grey values are.
 #[derive(Debug, Clone, Serialize)]
 pub struct ScanInfo {
+    /// Name of the scan, as in results.
     pub scan: String,
+    /// The format of the file, in words.
     pub format: String,
     /// Along x, y, z of the axes turned to the file's orientation, as all commands use them.
     pub voxels: [usize; 3],
     /// None where the file does not say. Along the same axes.
     pub spacing_mm: Option<[f64; 3]>,
+    /// Edges of the whole volume along the same axes; None where the file gives no voxel size.
     pub size_mm: Option<[f64; 3]>,
     /// Unit of the grey values where known.
     pub unit: Option<String>,
+    /// Least finite value that is no padding; None where there is none.
     pub grey_min: Option<f32>,
+    /// Largest such value.
     pub grey_max: Option<f32>,
+    /// Mean of such values.
     pub grey_mean: Option<f64>,
     /// Grey values below which 1, 25, 50, 75 and 99 % of the voxels lie.
     pub grey_percentiles: Vec<f32>,
@@ -33,21 +40,29 @@ pub struct ScanInfo {
     pub otsu_share: Option<f64>,
     /// Values and their voxels where they are few: a labelled scan or a mask.
     pub labels: Vec<(f32, u64)>,
+    /// The file's calibration of grey values; None where it has none.
     pub calibration: Option<Calibration>,
     /// Values from the first to the second stand for no measurement, by the file's word: no part of the numbers above. None
     /// where no voxel holds one.
     pub padding: Option<[f32; 2]>,
+    /// Number of voxels that hold padding.
     pub padding_voxels: u64,
+    /// Number of NaN and infinite voxels.
     pub non_finite_voxels: u64,
+    /// BLAKE3 hash of the scan, in hexadecimal digits.
     pub blake3: String,
     /// Further facts of the format. Names of persons are left out.
     pub details: Vec<(String, String)>,
+    /// What a reader must know of the file.
     pub notes: Vec<String>,
     /// One line per fact, for people.
     #[serde(skip)]
     pub lines: Vec<String>,
 }
 
+/// Reads a scan and says what is known of it.
+/// | # Errors
+/// A file that cannot be read, or that is no scan.
 pub fn info(file: &Path) -> Result<ScanInfo> {
     info_of(file, None)
 }

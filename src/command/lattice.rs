@@ -24,13 +24,16 @@ use std::path::{Path, PathBuf};
 /// A format for other programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Export {
+    /// A LAMMPS data file: sites and bonds.
     Lammps,
+    /// A VTK file: sites and bonds, for ParaView.
     Vtk,
 }
 
 /// What is written for other programs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exports {
+    /// One file a lattice and format; none where this is empty.
     pub formats: Vec<Export>,
     /// Young's modulus and, for LAMMPS, the law of moduli that differ.
     pub tissue: SolveParams,

@@ -10,8 +10,9 @@ use crate::command::Outcome;
 use crate::error::{Error, Result};
 use crate::io::atomic;
 use crate::machine::session::Session;
-use crate::scene::frame::Summary;
+pub use crate::scene::frame::Summary;
 use crate::scene::setting::Inputs;
+pub use crate::scene::step_statistics::StepStatistics;
 use crate::scene::{Scene, check, run};
 use serde::Serialize;
 use std::path::Path;
@@ -21,11 +22,16 @@ use writer::Writer;
 /// `scene.json`, and what `--json` prints.
 #[derive(Debug, Clone, Serialize)]
 pub struct SceneRecord {
+    /// From the scene file.
     pub title: String,
+    /// Version of the program.
     pub version: String,
+    /// How the scene ended.
     #[serde(flatten)]
     pub summary: Summary,
+    /// Unknowns over points.
     pub unknowns_per_point: f64,
+    /// Wall time in seconds.
     pub wall_s: f64,
     /// Numbers of the last state.
     pub last: serde_json::Map<String, serde_json::Value>,

@@ -13,7 +13,7 @@ use crate::pipeline::segment as stage;
 use crate::pipeline::segment::{SegmentParams, Voi};
 use crate::record::results;
 use crate::record::specimen;
-use crate::record::specimen::{Input, SegmentRecord};
+pub use crate::record::specimen::{Input, SegmentRecord};
 use crate::volume::{Specimen, Volume};
 use rayon::prelude::*;
 use std::path::Path;

@@ -100,10 +100,13 @@ impl OpenScan {
         })
     }
 
+    /// The mask, with the grey values where the settings need them.
     pub fn specimen(&self) -> &Specimen {
         &self.specimen
     }
 
+    /// The specimen with its tissue.
+    #[doc(hidden)]
     pub fn prepared(&self) -> Prepared<'_> {
         Prepared {
             specimen: &self.specimen,
@@ -124,14 +127,18 @@ impl OpenScan {
             .map_or(0.0, |t| shape::surface(sensitivity, t / voxel_mm))
     }
 
+    /// The mask.
     pub fn bone(&self) -> &Volume<u8> {
         &self.specimen.bone
     }
 
+    /// `2 BV / BS` of the mask, in mm; None where the bone has no surface.
     pub fn plate_thickness_mm(&self) -> Option<f64> {
         self.plate_thickness_mm
     }
 
+    /// The rows in the folder, old and new.
+    #[doc(hidden)]
     pub fn results(&mut self) -> &mut Results {
         &mut self.results
     }
@@ -417,6 +424,7 @@ pub fn export_inp(dir: &Path, params: &SolveParams, bins: usize, session: &Sessi
 ///
 /// # Errors
 /// A load without such a model, an unwritable file.
+#[doc(hidden)]
 pub fn export_smooth(
     dir: &Path,
     kind: Kind,

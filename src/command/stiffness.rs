@@ -11,6 +11,7 @@ use crate::result::row::{Marks, Row, Solution};
 use crate::volume::Specimen;
 use std::path::Path;
 
+/// Name of the file with the stiffness matrix.
 pub const RECORD: &str = "stiffness.json";
 
 /// Whether the matrix in `dir` follows from these settings and the mask of this hash.

@@ -13,6 +13,7 @@ use std::path::Path;
 pub enum GreyUnit {
     /// As stored.
     Native,
+    /// Hounsfield units.
     Hu,
     /// HU where the file holds a calibration to it, else as stored: for recipes that take scans of several formats.
     HuWhereKnown,
@@ -23,6 +24,7 @@ pub enum GreyUnit {
 /// Constants from an AIM's processing log or an ISQ's header; None where it does not hold them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Calibration {
+    /// Stored units per 1/cm.
     pub mu_scaling: Option<f64>,
     /// 1/cm.
     #[serde(rename = "mu_water_per_cm")]

@@ -5,6 +5,7 @@ use crate::machine::host;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+/// A scan's log file, and the lines that wait for its folder.
 #[derive(Debug)]
 pub struct Log {
     file: PathBuf,
@@ -12,6 +13,7 @@ pub struct Log {
 }
 
 impl Log {
+    /// A log in `file`; nothing is written yet.
     pub fn new(file: PathBuf) -> Log {
         Log {
             file,
@@ -19,6 +21,7 @@ impl Log {
         }
     }
 
+    /// Adds a line with the date and time.
     pub fn add(&mut self, line: &str) {
         self.waiting += &format!("{} {line}\n", host::date());
         if self.folder().is_dir() {

@@ -21,6 +21,7 @@ impl Meter {
         }
     }
 
+    /// Seconds since the start.
     pub fn wall_s(&self) -> f64 {
         self.since.elapsed().as_secs_f64()
     }

@@ -14,7 +14,9 @@ use std::time::Duration;
 pub struct Session {
     /// None: one per core.
     pub threads: Option<usize>,
+    /// No progress on stderr; results and warnings stay.
     pub quiet: bool,
+    /// Details on stderr as well.
     pub verbose: bool,
     /// stdout is for the JSON alone.
     pub json: bool,
@@ -26,6 +28,7 @@ pub struct Session {
     pub scan: Option<String>,
     /// Other scans are worked on at the same time: the process's memory is not this one's.
     pub shares_process: bool,
+    /// Where words go other than the terminal.
     pub output: Output,
 }
 

@@ -7,11 +7,13 @@
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
+/// The criterion's two numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pistoia {
     /// Share of the bone volume, 0 to 1.
     pub critical_volume: f64,
+    /// Effective strain `√(2 SED / E)` that this share must exceed.
     pub critical_strain: f64,
 }
 
@@ -38,6 +40,7 @@ pub struct Failure {
 pub const TABLE: [f64; 7] = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07];
 
 impl Pistoia {
+    /// Refuses numbers that are no criterion.
     pub fn check(&self) -> Result<()> {
         let volume = self.critical_volume > 0.0 && self.critical_volume < 1.0;
         if volume && self.critical_strain > 0.0 && self.critical_strain.is_finite() {

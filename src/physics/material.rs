@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 /// An isotropic solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solid {
+    /// Young's modulus.
     pub young_mpa: f64,
+    /// Poisson's ratio.
     pub poisson: f64,
 }
 
@@ -19,6 +21,7 @@ pub struct Solid {
 pub struct Label {
     /// The voxels' value, as 100 (trabecular) or 127 (cortical) in Scanco's masks.
     pub value: i32,
+    /// Young's modulus.
     pub young_mpa: f64,
     /// None: as for all tissue.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -29,20 +32,27 @@ pub struct Label {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub enum Law {
+    /// A modulus for each value of a labelled scan.
     Labels(Vec<Label>),
     /// `E = coefficient · ρ^exponent` (Carter and Hayes 1977, Morgan et al. 2003).
     Power {
+        /// In MPa where ρ is 1.
         coefficient: f64,
+        /// Power of ρ.
         exponent: f64,
     },
     /// `E = slope · ρ + intercept` (as Mulder et al. 2007: 25 ρ − 5830, ρ in mg HA/cm³).
     Linear {
+        /// In MPa per unit of ρ.
         slope: f64,
+        /// In MPa.
         intercept: f64,
     },
     /// `E = E_full · (ρ / full)^exponent` with the tissue's E for E_full (Homminga et al. 2001, exponent 1.7).
     Homminga {
+        /// Density whose modulus is E_full.
         full: f64,
+        /// 1.7 where it is left out.
         #[serde(default = "homminga_exponent")]
         exponent: f64,
     },
@@ -60,6 +70,7 @@ fn as_stored() -> [f64; 2] {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
+    /// From density to modulus.
     pub law: Law,
     /// Slope and intercept from the scan's values to the law's density.
     #[serde(default = "as_stored")]
@@ -70,6 +81,7 @@ pub struct Material {
 }
 
 impl Material {
+    /// The law applied to the scan's values as they are.
     pub fn new(law: Law) -> Self {
         Material {
             law,

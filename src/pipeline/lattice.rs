@@ -16,8 +16,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LatticeParams {
+    /// The cubic lattices.
     pub structure: Vec<Structure>,
+    /// The lattice parameters.
     pub lp_mm: Vec<f64>,
+    /// The rules by which sites exist.
     pub boundary: Vec<BoundaryWord>,
     /// Offset of the lattice in mm.
     pub registration_mm: [f64; 3],
@@ -73,9 +76,13 @@ impl LatticeParams {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BoundaryWord {
+    /// Sites within 1.1 first-neighbour distances of bone.
     Firm,
+    /// Sites that lie in a bone voxel.
     Floppy,
+    /// SC: a site for each connected component of bone in a cell.
     Connected,
+    /// BCC, FCC: sites weighted by the bone fraction of their cell.
     Weighted,
     /// The older word for both: connected on SC, weighted on BCC and FCC.
     Graded,
@@ -116,9 +123,13 @@ impl BoundaryWord {
 /// One lattice of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
+    /// The cubic lattice.
     pub structure: Structure,
+    /// The lattice parameter.
     pub lp_mm: f64,
+    /// Which sites exist.
     pub boundary: Boundary,
+    /// Offset of the lattice along x, y, z.
     pub registration_mm: [f64; 3],
 }
 
@@ -194,11 +205,13 @@ impl Case {
 ///
 /// # Errors
 /// A lattice parameter or grip that does not fit the specimen.
+#[doc(hidden)]
 pub fn build(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<Sites> {
     build_of(specimen, None, case, axis, grip_mm)
 }
 
 /// The same where tissue differs: `tissue` is each voxel's modulus over that of the lattice, not read in pores.
+#[doc(hidden)]
 pub fn build_of(
     specimen: &Specimen,
     tissue: Option<&[f32]>,
@@ -221,6 +234,7 @@ fn weights(specimen: &Specimen, tissue: Option<&[f32]>, case: &Case, frame: &Fra
 }
 
 /// What each site of a lattice takes of `tissue`, a value per voxel, times its weight: as its springs are made by [`build_of`].
+#[doc(hidden)]
 pub fn site_values(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sites) -> Vec<f64> {
     let frame = &sites.frame;
     let weights = weights(specimen, Some(tissue), case, frame);
@@ -232,6 +246,7 @@ pub fn site_values(specimen: &Specimen, tissue: &[f32], case: &Case, sites: &Sit
 ///
 /// # Errors
 /// As [`build`].
+#[doc(hidden)]
 pub fn build_connected(
     specimen: &Specimen,
     case: &Case,
@@ -274,11 +289,17 @@ fn place(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(
 /// What a lattice is made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LatticeSummary {
+    /// The cubic lattice.
     pub structure: Structure,
+    /// Which sites exist.
     pub boundary: BoundaryRule,
+    /// The lattice parameter.
     pub lp_mm: f64,
+    /// Sites that carry load.
     pub sites: usize,
+    /// Bonds between them, each counted once.
     pub bonds: usize,
+    /// Sites with all bonds of the structure; on the loaded faces all that stay inside the volume.
     pub fully_coordinated_sites: usize,
     /// Sites without a path of bonds to both grips.
     pub dropped_sites: usize,
@@ -286,6 +307,8 @@ pub struct LatticeSummary {
     pub lattice_bv_tv: f64,
 }
 
+/// The counts of a lattice of sites.
+#[doc(hidden)]
 pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSummary {
     LatticeSummary {
         structure: case.structure,
@@ -302,6 +325,7 @@ pub fn summarise(specimen: &Specimen, case: &Case, sites: &Sites) -> LatticeSumm
 }
 
 /// [`summarise`] for a connected lattice. Fully coordinated are those with a neighbour along every bond.
+#[doc(hidden)]
 pub fn summarise_connected(
     specimen: &Specimen,
     case: &Case,

@@ -14,29 +14,38 @@ use std::path::{Path, PathBuf};
 /// `segment.json`: what was segmented, how, and what came out; enough to repeat it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SegmentRecord {
+    /// Name of the program.
     pub program: String,
+    /// Its version.
     pub version: String,
+    /// Name of the scan.
     pub scan: String,
+    /// What was read.
     pub input: Input,
+    /// The settings of the segmentation.
     pub settings: SegmentParams,
+    /// What came out.
     pub results: SegmentSummary,
 }
 
 /// The scan that was read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Input {
+    /// As it was given.
     #[serde(serialize_with = "shown")]
     pub path: PathBuf,
     /// Of the file, or of the names and contents of a folder's slices.
     pub blake3: String,
     /// Of the mask that is the volume of interest, where one is.
     pub voi_blake3: Option<String>,
+    /// The format of the file, in words.
     pub format: String,
     /// Unit of the grey values where the file states it.
     pub unit: Option<String>,
     /// From the file's axes to x, y, z of the results. Mask, grey values and fields are written in the file's order.
     #[serde(default)]
     pub axes: Turn,
+    /// What a reader must know of the file.
     pub notes: Vec<String>,
 }
 

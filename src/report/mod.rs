@@ -33,6 +33,7 @@ use table::Line;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReportParams {
+    /// Heading of the page.
     pub title: String,
 }
 

@@ -15,37 +15,61 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(default)]
 pub struct AnswerLine {
+    /// Name of the scan.
     pub scan: String,
+    /// From the manifest: who the scan is of.
     pub subject: Option<String>,
+    /// From the manifest.
     pub group: Option<String>,
+    /// Bone volume fraction, 0 to 1.
     pub bv_tv: f64,
+    /// Apparent modulus `K L / A`, pores included in A. None under loads that have no modulus.
     pub e_app_mpa: Option<f64>,
     /// All that is stated; None where the resolution's error is not.
     pub error_mpa: Option<f64>,
+    /// `error_mpa` over `e_app_mpa`, in percent; None where either is, or the modulus is 0.
     pub error_percent: Option<f64>,
     /// None where no error was asked for.
     pub met: Option<bool>,
+    /// The method of the row that answers.
     pub method: FoundBy,
+    /// Lattice parameter or element size; of a limit the finest that it follows from.
     pub element_mm: f64,
+    /// Young's modulus of the tissue; of tissue that differs the bone's mean.
     pub young_mpa: f64,
+    /// Poisson's ratio of the tissue.
     pub poisson: f64,
+    /// Word of the load.
     pub load: String,
+    /// How ends, or faces, are held, as a word.
     pub ends: String,
+    /// The load axis: `x`, `y` or `z`.
     pub axis: String,
+    /// Thickness that is held at each end; 0: end planes only.
     pub grip_mm: f64,
+    /// Force over the displacement of the ends. None under bending and torsion.
     pub stiffness_n_per_mm: Option<f64>,
+    /// Force at the strain applied, a magnitude. None under bending and torsion.
     pub force_n: Option<f64>,
+    /// Force at failure by Pistoia's criterion, a magnitude; None where it was not asked for.
     pub failure_load_n: Option<f64>,
+    /// Apparent yield stress by the 0.2 % offset; None where tissue stays elastic or the curve ends before.
     pub yield_stress_mpa: Option<f64>,
+    /// Relative change of E_app per relative change of bone volume; None where it was not estimated.
     pub threshold_sensitivity: Option<f64>,
+    /// What a reader must know of this number.
     pub note: Option<String>,
     /// Of bending and torsion.
     pub angle_deg: Option<f64>,
+    /// Moment at the angle applied, a magnitude. None under other loads.
     pub moment_nmm: Option<f64>,
+    /// Moment at failure by Pistoia's criterion, a magnitude. None under other loads.
     pub failure_moment_nmm: Option<f64>,
     /// Of tissue that yields.
     pub yield_stress_error_mpa: Option<f64>,
+    /// Largest apparent stress of the curve, a magnitude.
     pub max_stress_mpa: Option<f64>,
+    /// Stated error of `max_stress_mpa`; None where it was not asked for.
     pub max_stress_error_mpa: Option<f64>,
 }
 
@@ -54,6 +78,7 @@ pub struct AnswerLine {
 pub struct ScanFacts {
     /// Of the volume along x, y, z.
     pub size_mm: Option<[f64; 3]>,
+    /// Errors that were asked for.
     pub targets: Targets,
     /// Of the segmentation.
     pub warnings: Vec<String>,

@@ -7,19 +7,27 @@ use crate::result::settings::{Conditions, Ends, Load, Motion, Settings, Supports
 /// What was done to a specimen, and of what tissue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Condition {
+    /// What is done to the specimen.
     pub load: Load,
+    /// How its ends or faces are held.
     pub supports: Supports,
+    /// The load axis.
     pub axis: Axis,
+    /// Nominal strain; negative is compression. 0 under bending and torsion.
     pub strain: f64,
     /// Of bending and torsion.
     pub angle_deg: Option<f64>,
+    /// Thickness that is held at each end; 0: end planes only.
     pub grip_mm: f64,
+    /// Poisson's ratio of the tissue.
     pub poisson: f64,
+    /// Young's modulus of the tissue.
     pub tissue: Tissue,
     /// The law by which tissue yields; None where it stays elastic.
     pub plasticity: Option<String>,
 }
 
+/// Young's modulus of the tissue: one, or a law.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Tissue {
     /// Young's modulus in MPa, everywhere.
@@ -32,6 +40,7 @@ pub enum Tissue {
 pub const DEFAULT_YOUNG_MPA: f64 = 1000.0;
 
 impl Condition {
+    /// The condition of a row's settings.
     pub fn of(key: &Settings) -> Condition {
         Condition {
             load: key.load,

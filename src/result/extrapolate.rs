@@ -48,6 +48,7 @@ pub fn with_extrapolated(rows: &[Row]) -> Vec<Row> {
     all
 }
 
+/// Whether a row is a limit of several resolutions.
 pub fn is_extrapolated(row: &Row) -> bool {
     row.key.boundary == Some(BoundaryRule::Extrapolated)
 }

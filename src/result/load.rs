@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub enum Load {
+    /// Ends nearer or apart along the axis, sides free.
     #[default]
     Uniaxial,
     /// Sides held against lateral motion.
@@ -15,11 +16,15 @@ pub enum Load {
     Stiffness,
     /// The upper end moves sideways along x; both ends are held in all components, here and below.
     ShearX,
+    /// The same along y.
     ShearY,
+    /// The same along z.
     ShearZ,
     /// Both ends tilt about x, in opposite directions.
     BendingX,
+    /// The same about y.
     BendingY,
+    /// The same about z.
     BendingZ,
     /// The upper end turns about the load axis.
     Torsion,
@@ -60,6 +65,7 @@ impl Load {
         "torsion",
     ];
 
+    /// The word of settings and results.
     pub fn name(self) -> &'static str {
         Load::WORDS[self as usize]
     }
@@ -94,12 +100,15 @@ impl Load {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "lowercase")]
 pub enum Ends {
+    /// They slide without friction.
     #[default]
     Free,
+    /// They are held.
     Bonded,
 }
 
 impl Ends {
+    /// The word of settings and results.
     pub fn name(self) -> &'static str {
         match self {
             Ends::Free => "free",
@@ -124,12 +133,15 @@ pub enum Conditions {
 }
 
 impl Conditions {
+    /// The words of settings and results, in the order of the variants.
     pub const WORDS: &[&str] = &["kinematic", "mixed", "symshear"];
 
+    /// The word of settings and results.
     pub fn name(self) -> &'static str {
         Conditions::WORDS[self as usize]
     }
 
+    /// As the report says it.
     pub fn in_words(self) -> &'static str {
         match self {
             Conditions::Kinematic => {
@@ -157,12 +169,15 @@ pub enum Sed {
 }
 
 impl Sed {
+    /// The words of settings and results, in the order of the variants.
     pub const WORDS: &[&str] = &["centre", "mean"];
 
+    /// The word of settings and results.
     pub fn name(self) -> &'static str {
         Sed::WORDS[self as usize]
     }
 
+    /// As the report says it.
     pub fn in_words(self) -> &'static str {
         match self {
             Sed::Centre => "of the strain at the element's centre",

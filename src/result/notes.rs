@@ -44,7 +44,9 @@ pub fn without_numbers(note: &str) -> String {
 /// A note as the first scan has it, and all scans that it is of.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alike {
+    /// The note of the first scan.
     pub first: String,
+    /// Names of all scans that it is of.
     pub scans: Vec<String>,
     /// The notes that differ from the first.
     others: Vec<String>,
@@ -164,6 +166,7 @@ impl Alikes {
         }
     }
 
+    /// The notes so far, in the order of their first scans.
     pub fn groups(&self) -> impl Iterator<Item = &Alike> {
         self.groups.iter().map(|(_, group)| group)
     }

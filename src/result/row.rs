@@ -11,35 +11,48 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(try_from = "Columns", into = "Columns")]
 pub struct Row {
+    /// What the row follows from.
     pub key: Settings,
     /// None before the solve.
     pub solved: Option<Solution>,
+    /// What is known of it apart from that.
     pub marks: Marks,
 }
 
 /// Numbers of a solve. What does not apply, or is not known, is None.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Solution {
+    /// Lattice sites or elements that carry load.
     pub sites: Option<u64>,
     /// Volume of the model that carries load (cells of sites, of connected and weighted lattices their bone; elements) over TV.
     pub model_bv_tv: Option<f64>,
+    /// Sites or elements left out because nothing connects them to both ends.
     pub dropped_sites: Option<u64>,
+    /// Degrees of freedom.
     pub unknowns: Option<u64>,
+    /// Iterations of the solver.
     pub iterations: Option<u64>,
+    /// Relative residual at the end.
     pub residual: Option<f64>,
+    /// Whether the error of the solver is below the tolerance.
     pub converged: Option<bool>,
     /// The headline: energy for all others; stress of the fully coordinated sites for firm.
     pub e_app_mpa: Option<f64>,
+    /// For checks: from the force at the ends. Of firm rows far too large: padded sites carry load.
     pub e_app_reaction_mpa: Option<f64>,
+    /// For checks: from the mean stress of all sites (firm: of the fully coordinated ones).
     pub e_app_stress_mpa: Option<f64>,
+    /// Estimated error that the solver left in `e_app_mpa`.
     pub algebraic_error_mpa: Option<f64>,
     /// Of modulus, stiffness, force and moment alike, over their value.
     pub algebraic_error_percent: Option<f64>,
     /// Of the moved end, magnitudes: along its displacement, or about the axis of its turn (of bending the mean of both ends).
     pub force_n: Option<f64>,
+    /// The moment of bending and torsion.
     pub moment_nmm: Option<f64>,
     /// Force over the displacement of the ends.
     pub stiffness_n_per_mm: Option<f64>,
+    /// Estimated error of the resolution.
     pub discretization_error_mpa: Option<f64>,
     /// What voxels, and the blur of the scan, leave open about the bone's surface.
     pub shape_error_mpa: Option<f64>,
@@ -66,7 +79,9 @@ pub struct FailureLoad {
     pub load_n: Option<f64>,
     /// None under forces.
     pub moment_nmm: Option<f64>,
+    /// Displacement of the ends. None under bending and torsion.
     pub displacement_mm: Option<f64>,
+    /// Nominal strain. None under bending and torsion.
     pub strain: Option<f64>,
 }
 
@@ -79,26 +94,33 @@ pub struct Marks {
     pub note: Option<String>,
     /// From a manifest.
     pub group: Option<String>,
+    /// From a manifest: who the scan is of.
     pub subject: Option<String>,
     /// Quick estimate of the struts' thickness, 2 BV / BS.
     pub mean_thickness_mm: Option<f64>,
     /// Of the whole mask, where `segment --morphometry` measured it: mean local thickness of bone and of pores,
     /// connectivity density, degree of anisotropy by mean intercept lengths.
     pub tb_th_mm: Option<f64>,
+    /// Mean local thickness of the pores (Tb.Sp).
     pub tb_sp_mm: Option<f64>,
+    /// Connectivity density (Conn.D).
     pub conn_d_per_mm3: Option<f64>,
+    /// Degree of anisotropy (DA); 1 is isotropic.
     pub da: Option<f64>,
 }
 
 impl Row {
+    /// The headline modulus; None before the solve and under loads that have none.
     pub fn e_app_mpa(&self) -> Option<f64> {
         self.solved.as_ref()?.e_app_mpa
     }
 
+    /// Whether the error of the solver is below the tolerance; None before the solve.
     pub fn converged(&self) -> Option<bool> {
         self.solved.as_ref()?.converged
     }
 
+    /// Wall time of the solve in seconds.
     pub fn wall_s(&self) -> Option<f64> {
         self.solved.as_ref()?.wall_s
     }
@@ -156,6 +178,7 @@ impl Row {
         }
     }
 
+    /// Failure by Pistoia's criterion; None where it was not asked for.
     pub fn failure(&self) -> Option<FailureLoad> {
         self.solved.as_ref()?.failure
     }

@@ -6,12 +6,16 @@ use crate::grid::Axis;
 pub use crate::result::load::{Conditions, Ends, Load, Motion, Sed};
 use serde::{Deserialize, Serialize};
 
+/// Column `method`: how a specimen is discretised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
+    /// Bonds between the sites of a lattice.
     #[default]
     Lattice,
+    /// Bricks on the voxels' grid.
     VoxelFe,
+    /// Ten-node tetrahedra inside a smooth surface.
     GeometryFe,
 }
 
@@ -19,6 +23,7 @@ impl Method {
     /// The words of settings and results, in the order of the variants.
     pub const WORDS: &[&str] = &["lattice", "voxel-fe", "geometry-fe"];
 
+    /// The word of settings and results.
     pub fn name(self) -> &'static str {
         Method::WORDS[self as usize]
     }
@@ -28,6 +33,7 @@ impl Method {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "&'static str")]
 pub enum CellType {
+    /// Sites of such a lattice.
     Lattice(Structure),
     /// Bricks of eight nodes.
     Hex8,
@@ -36,10 +42,12 @@ pub enum CellType {
 }
 
 impl CellType {
+    /// Whether it is a lattice.
     pub fn is_lattice(self) -> bool {
         matches!(self, CellType::Lattice(_))
     }
 
+    /// The word of results.
     pub fn name(self) -> &'static str {
         match self {
             CellType::Lattice(structure) => structure.name(),
@@ -59,7 +67,9 @@ impl Default for CellType {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "&'static str")]
 pub enum BoundaryRule {
+    /// Sites within 1.1 first-neighbour distances of bone.
     Firm,
+    /// Sites that lie in a bone voxel.
     Floppy,
     /// Sites that go with the bone in a cell: connected SC lattices, weighted BCC and FCC lattices.
     Graded,
@@ -70,6 +80,7 @@ pub enum BoundaryRule {
 }
 
 impl BoundaryRule {
+    /// The word of results.
     pub fn name(self) -> &'static str {
         match self {
             BoundaryRule::Firm => "firm",
@@ -109,11 +120,14 @@ impl From<Boundary> for BoundaryRule {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "&'static str")]
 pub enum Supports {
+    /// The two loaded ends.
     Ends(Ends),
+    /// All six faces, under unit strains.
     Faces(Conditions),
 }
 
 impl Supports {
+    /// The word of results.
     pub fn name(self) -> &'static str {
         match self {
             Supports::Ends(ends) => ends.name(),
@@ -208,8 +222,11 @@ pub enum Elements {
 /// All that a row follows from. Rows with equal settings are of the same solve.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Settings {
+    /// Name of the scan.
     pub scan: String,
+    /// How the specimen is discretised.
     pub method: Method,
+    /// What the model is made of.
     pub structure: CellType,
     /// None for voxel FE.
     pub boundary: Option<BoundaryRule>,
@@ -223,9 +240,13 @@ pub struct Settings {
     pub voxel_mm: [f64; 3],
     /// The bone's mean where `material` is given.
     pub young_mpa: f64,
+    /// Poisson's ratio of the tissue.
     pub poisson: f64,
+    /// What is done to the specimen.
     pub load: Load,
+    /// How ends or faces are held.
     pub supports: Supports,
+    /// The load axis.
     pub axis: Axis,
     /// 0 under a load that an angle describes.
     pub strain: f64,
@@ -233,8 +254,11 @@ pub struct Settings {
     pub angle_deg: Option<f64>,
     /// 0 for end planes.
     pub grip_mm: f64,
+    /// What TV is, in words.
     pub tv_definition: String,
+    /// Volume of interest, pores included.
     pub tv_mm3: f64,
+    /// Bone volume fraction, 0 to 1.
     pub bv_tv: f64,
     /// Relative algebraic error allowed in the headline.
     pub tolerance: Option<f64>,

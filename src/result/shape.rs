@@ -35,7 +35,10 @@ pub enum Image {
     /// A mask or labels: a guess.
     Mask,
     /// Grey values whose blur, smoothing included, has this σ.
-    Grey { blur_voxels: f64 },
+    Grey {
+        /// In voxels.
+        blur_voxels: f64,
+    },
 }
 
 /// Relative errors of a modulus.

@@ -7,17 +7,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 #[serde(default)]
 pub struct CurvePoint {
+    /// Number of the load step, from 1.
     pub step: u64,
     /// Nominal.
     pub strain: f64,
     /// Apparent: force over the whole end area.
     pub stress_mpa: f64,
+    /// Along the displacement of the ends.
     pub force_n: f64,
     /// Share of the bone's volume that has ever flowed.
     pub plastic_volume_fraction: f64,
     /// Stored elastically now.
     pub energy_mj: f64,
+    /// By plastic flow.
     pub dissipated_mj: f64,
+    /// Of the ends: mean force of a step times its displacement.
     pub work_mj: f64,
     /// Of conjugate gradients, in this step.
     pub iterations: u64,
@@ -29,18 +33,22 @@ pub struct CurvePoint {
 pub struct YieldedShare {
     /// Of a labelled scan; `all` for all bone.
     pub label: String,
+    /// Elements of this tissue.
     pub elements: u64,
     /// Share of the volume.
     pub yielded_share: f64,
     /// Largest and mean equivalent plastic strain of its elements.
     pub maximum_plastic_strain: f64,
+    /// Mean equivalent plastic strain over all its elements.
     pub mean_plastic_strain: f64,
 }
 
 /// A loaded body that yields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 pub struct Yielding {
+    /// One point a load step.
     pub curve: Vec<CurvePoint>,
+    /// One line a tissue.
     pub shares: Vec<YieldedShare>,
     /// True where steps ended before the whole load.
     pub stopped: bool,
@@ -53,10 +61,13 @@ pub struct Yielding {
 pub struct Strength {
     /// None where the curve ends before.
     pub yield_stress_mpa: Option<f64>,
+    /// Nominal strain at yield, by the 0.2 % offset.
     pub yield_strain: Option<f64>,
+    /// Largest apparent stress of the curve.
     pub max_stress_mpa: Option<f64>,
     /// What finer load steps and elements would change and the solver left; None where it was not asked for.
     pub yield_stress_error_mpa: Option<f64>,
+    /// The same of `max_stress_mpa`.
     pub max_stress_error_mpa: Option<f64>,
 }
 

@@ -124,12 +124,15 @@ pub trait Observer {
 /// How a scene ended.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Summary {
+    /// Points of the body.
     pub points: usize,
     /// Unknowns solved for, in all.
     pub unknowns: usize,
     /// Bonds, each counted once.
     pub bonds: usize,
+    /// Steps in time or load.
     pub steps: usize,
+    /// False where a step, a solve or a mode was left without convergence.
     pub converged: bool,
     /// How the time step changed, where time is marched through.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -14,6 +14,7 @@ pub struct StepStatistics {
     pub growths: usize,
     /// Among the accepted ones; 0 where there were none.
     pub shortest_step: f64,
+    /// The same of the longest.
     pub longest_step: f64,
     #[serde(skip)]
     last: f64,

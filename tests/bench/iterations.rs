@@ -2,6 +2,8 @@
 //! stops, and those of plain conjugate gradients. `cargo bench --bench iterations`, half an hour; words choose
 //! cases (`-- thin-3 stack`). Iterations do not depend on the machine.
 
+#![allow(missing_docs, reason = "a bench is no interface")]
+
 use bonepd_ct::command::segment::in_memory;
 use bonepd_ct::discretisation::voxels::Planes;
 use bonepd_ct::machine::session::Session;

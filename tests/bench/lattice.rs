@@ -2,6 +2,8 @@
 //! file to report; and the operators' share of what memory and arithmetic allow, measured in the same run.
 //! `cargo bench --bench lattice`; `BONEPD_BENCH_VOXELS` sets the edge (default 100: about 250 000 sites).
 
+#![allow(missing_docs, reason = "a bench is no interface")]
+
 mod limits;
 mod specimen;
 

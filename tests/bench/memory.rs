@@ -2,6 +2,8 @@
 //! Beside it what `--dry-run` predicts. `cargo bench --bench memory`; `BONEPD_BENCH_VOXELS` sets the edge (default 160: about
 //! 1e6 sites and elements); words choose cases (`-- plump "sc firm"`).
 
+#![allow(missing_docs, reason = "a bench is no interface")]
+
 mod specimen;
 
 use bonepd_ct::pipeline::apparent::SolveParams;
@@ -36,19 +38,23 @@ impl Counting {
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         Counting::add(layout.size());
+        // SAFETY: the caller keeps the contract of `GlobalAlloc`, which is that of the system's allocator.
         unsafe { System.alloc(layout) }
     }
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         Counting::add(layout.size());
+        // SAFETY: the caller keeps the contract of `GlobalAlloc`, which is that of the system's allocator.
         unsafe { System.alloc_zeroed(layout) }
     }
     unsafe fn dealloc(&self, p: *mut u8, layout: Layout) {
         NOW.fetch_sub(layout.size(), Relaxed);
+        // SAFETY: the caller keeps the contract of `GlobalAlloc`, which is that of the system's allocator.
         unsafe { System.dealloc(p, layout) }
     }
     unsafe fn realloc(&self, p: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         Counting::add(size);
         NOW.fetch_sub(layout.size(), Relaxed);
+        // SAFETY: the caller keeps the contract of `GlobalAlloc`, which is that of the system's allocator.
         unsafe { System.realloc(p, layout, size) }
     }
 }

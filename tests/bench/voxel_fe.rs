@@ -2,6 +2,8 @@
 //! beside a triad of the same run; and the operators' share of what memory and arithmetic allow, measured with them.
 //! `cargo bench --bench voxel_fe`; `BONEPD_BENCH_VOXELS` sets the edge (default 100).
 
+#![allow(missing_docs, reason = "a bench is no interface")]
+
 mod limits;
 mod specimen;
 

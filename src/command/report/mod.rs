@@ -64,6 +64,7 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
 }
 
 /// The answers of `rows`, with what the folders of the scans, under `dirs`, say of them.
+#[doc(hidden)]
 pub fn answers(rows: &[Row], dirs: &[PathBuf]) -> Answers {
     answers::answers(rows, |scan| {
         folder(scan, dirs).map_or_else(ScanFacts::default, |(dir, _)| answer::facts(&dir))
@@ -74,16 +75,24 @@ pub fn answers(rows: &[Row], dirs: &[PathBuf]) -> Answers {
 pub const METHODS: &str = "methods.md";
 
 /// What a report is of. `dirs` are searched for what is known of the scans.
+#[doc(hidden)]
 pub struct Sources<'a> {
+    /// All rows, in their order.
     pub rows: &'a [Row],
+    /// The answers of the scans.
     pub answers: Answers,
+    /// Scans of a run that have no results.
     pub failures: &'a [Failure],
+    /// Settings of `report`.
     pub params: &'a ReportParams,
+    /// Output folders, or folders of scans.
     pub dirs: &'a [PathBuf],
+    /// The recipe as text; None where rows come from single commands.
     pub recipe: Option<String>,
 }
 
 /// Writes the report into `out`. Returns the files written.
+#[doc(hidden)]
 pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<PathBuf>> {
     let Sources {
         rows,

@@ -22,6 +22,7 @@ pub enum Boundary {
 }
 
 impl Boundary {
+    /// The word of settings.
     pub fn name(self) -> &'static str {
         match self {
             Boundary::Firm => "firm",

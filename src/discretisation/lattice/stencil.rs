@@ -7,9 +7,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
 #[serde(rename_all = "lowercase")]
 pub enum Structure {
+    /// Simple cubic.
     #[default]
     Sc,
+    /// Body-centred cubic.
     Bcc,
+    /// Face-centred cubic.
     Fcc,
 }
 
@@ -57,8 +60,10 @@ const FCC: [[i32; 3]; 9] = [
 ];
 
 impl Structure {
+    /// The three lattices.
     pub const ALL: [Structure; 3] = [Structure::Sc, Structure::Bcc, Structure::Fcc];
 
+    /// The word of settings and results.
     pub fn name(self) -> &'static str {
         match self {
             Structure::Sc => "sc",

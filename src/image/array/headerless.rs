@@ -26,15 +26,18 @@ const TYPES: [Scalar; 11] = [
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(into = "String")]
 pub struct Contents {
+    /// Voxels along x (fastest), y, z.
     pub n: [usize; 3],
     /// One of [`Contents::TYPES`].
     pub kind: &'static str,
+    /// Byte order of numbers of several bytes.
     pub big_endian: bool,
     /// Bytes before the first voxel.
     pub skip: u64,
 }
 
 impl Contents {
+    /// The types of a voxel.
     pub const TYPES: [&'static str; 11] = [
         "uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float16",
         "float32", "float64",

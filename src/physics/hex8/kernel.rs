@@ -166,18 +166,20 @@ unsafe fn sweep<L: Lanes<S: Scalar>>(
 /// Every set of registers that this processor has, with its name.
 #[cfg(test)]
 pub fn each_way_f64(mut visit: impl FnMut(&str, Way<f64>)) {
-    // SAFETY: plain arrays ask for nothing; the others are asked for before each.
+    // SAFETY: plain arrays ask for nothing of the processor.
     visit("plain", |e, n, x, y| unsafe {
         sweep::<simd::PlainF64>(e, n, x, y, &mut Vec::new())
     });
     #[cfg(target_arch = "x86_64")]
     {
         if simd::isa() != Isa::Portable {
+            // SAFETY: `isa` is other than portable only where there are AVX2 and FMA.
             visit("avx2", |e, n, x, y| unsafe {
                 avx2_f64(e, n, x, y, &mut Vec::new())
             });
         }
         if simd::isa() == Isa::Avx512 {
+            // SAFETY: `isa` says so only where there is AVX-512F, with AVX2 and FMA.
             visit("avx512", |e, n, x, y| unsafe {
                 avx512(e, n, x, y, &mut Vec::new())
             });
@@ -188,12 +190,13 @@ pub fn each_way_f64(mut visit: impl FnMut(&str, Way<f64>)) {
 /// The same in single precision.
 #[cfg(test)]
 pub fn each_way_f32(mut visit: impl FnMut(&str, Way<f32>)) {
-    // SAFETY: as above.
+    // SAFETY: plain arrays ask for nothing of the processor.
     visit("plain", |e, n, x, y| unsafe {
         sweep::<simd::PlainF32>(e, n, x, y, &mut Vec::new())
     });
     #[cfg(target_arch = "x86_64")]
     if simd::isa() != Isa::Portable {
+        // SAFETY: `isa` is other than portable only where there are AVX2 and FMA.
         visit("avx2", |e, n, x, y| unsafe {
             avx2_f32(e, n, x, y, &mut Vec::new())
         });

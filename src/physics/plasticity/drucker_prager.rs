@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DruckerPrager {
+    /// Yield stress in tension.
     pub tension_mpa: f64,
     /// A magnitude, not below `tension_mpa`.
     pub compression_mpa: f64,

@@ -36,6 +36,7 @@ pub struct Point {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum YieldLaw {
+    /// Equal yield in tension and compression.
     VonMises(VonMises),
     /// Unlike yield in tension and compression.
     Asymmetric(DruckerPrager),

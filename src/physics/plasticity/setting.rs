@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LabelLaw {
+    /// The voxels' value.
     pub value: i32,
+    /// How this tissue yields.
     pub law: YieldLaw,
 }
 
@@ -16,7 +18,9 @@ pub struct LabelLaw {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Plasticity {
+    /// One law for all bone.
     All(YieldLaw),
+    /// A law for each label.
     Labels(Vec<LabelLaw>),
 }
 

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VonMises {
+    /// Yield stress in tension and compression.
     pub yield_mpa: f64,
     /// Slope of uniaxial stress over plastic strain; 0 is perfect.
     #[serde(default)]

@@ -26,7 +26,9 @@ pub type Displacements = Vec<[f64; 3]>;
 /// A specimen with the tissue of its voxels: both are made once and serve all solves of a command.
 #[derive(Clone, Copy)]
 pub struct Prepared<'a> {
+    /// The mask and, where needed, grey values.
     pub specimen: &'a Specimen,
+    /// What its voxels are made of.
     pub tissue: &'a Tissue,
 }
 
@@ -82,9 +84,11 @@ pub type EachEndSite<'a> = Box<dyn Fn(&mut dyn FnMut(usize, End, [f64; 3])) + 'a
 
 /// The ends of a discretised specimen.
 pub struct EndSites<'a> {
+    /// How they move.
     pub motion: EndMotion,
     /// Heights of the innermost gripped planes.
     pub planes_mm: [f64; 2],
+    /// Goes over their sites.
     pub each: EachEndSite<'a>,
 }
 
@@ -114,12 +118,15 @@ impl LoadSet {
 
 /// Equations of equilibrium, `A u = 0` on the unknowns that are not held.
 pub struct System<'a, O, C, G> {
+    /// The stiffness.
     pub operator: &'a O,
     /// What the preconditioner is built on: the operator, or the part of it that dominates.
     pub coarsen: C,
+    /// Settings of multigrid.
     pub multigrid: AmgParams,
     /// The quantity wanted, where it is not the energy.
     pub goal: Option<G>,
+    /// Which unknowns are held.
     pub held: Held,
     /// The start of a load (by number), which has the prescribed displacements: the field of a homogeneous body.
     pub start: Box<dyn Fn(usize) -> Displacements + 'a>,
@@ -139,7 +146,9 @@ pub struct System<'a, O, C, G> {
 
 /// Sites on an integer grid; `reach` is how far, along an axis, one site's displacement can be felt.
 pub struct Places {
+    /// Place of each site, in steps of the grid.
     pub at: Vec<[i32; 3]>,
+    /// In steps of the grid.
     pub reach: i32,
 }
 
@@ -148,7 +157,9 @@ pub struct Places {
 pub enum Known<'a> {
     /// The size of the scan, from its header: voxels and, where their size is known, volume in mm³.
     Header {
+        /// Number of voxels.
         voxels: f64,
+        /// Volume of the scan; None where the voxel size is not known.
         volume_mm3: Option<f64>,
     },
     /// The bone, of which only the volume is looked at.
@@ -164,6 +175,7 @@ pub struct Cost {
     pub bytes: [f64; 2],
     /// Seconds on two cores; None where the voxel size is not known.
     pub time_s: Option<f64>,
+    /// The setting that makes a solve smaller.
     pub resolution: Resolution,
 }
 

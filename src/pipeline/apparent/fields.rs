@@ -12,8 +12,11 @@ use serde::{Deserialize, Serialize};
 /// Displacements (mm) in equilibrium and the nodal forces (N) that they take.
 #[derive(Clone, Copy)]
 pub struct Equilibrated<'a> {
+    /// Displacement of each site, mm.
     pub u: &'a [[f64; 3]],
+    /// Nodal force of each site, N.
     pub force: &'a [[f64; 3]],
+    /// What the solve came to.
     pub info: &'a CgInfo,
     /// Equivalent plastic strain of the elements that have yielded, by index in the mesh's grid, rising; None where nothing can yield.
     pub plastic: Option<&'a [(usize, f32)]>,
@@ -23,17 +26,21 @@ pub struct Equilibrated<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Field {
+    /// Displacement, mm: three components.
     Displacement,
     /// Strain energy density.
     Sed,
+    /// Von Mises stress, MPa.
     VonMises,
     /// Bone fraction of the elements.
     Fraction,
     /// Six components, engineering shears.
     Strain,
+    /// Six components, MPa.
     Stress,
     /// Three values, largest first, and their directions.
     PrincipalStrain,
+    /// The same of stresses, MPa.
     PrincipalStress,
     /// `√(2 SED / E)` (Pistoia et al. 2002).
     EffectiveStrain,
@@ -87,6 +94,7 @@ pub struct FieldVolume {
     pub components: Vec<Volume<f32>>,
     /// What the components are, as `xx`; empty for a scalar.
     pub labels: &'static [&'static str],
+    /// Where the values lie.
     pub place: Place,
     /// In words, at most 79 characters: NIfTI headers hold no more.
     pub about: String,
@@ -95,6 +103,7 @@ pub struct FieldVolume {
 /// Where the values of a field lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
+    /// Middles of the voxels.
     Voxels,
     /// Corners of the voxels.
     Nodes,
@@ -117,15 +126,20 @@ pub struct Recorded {
     pub sites: Option<SiteFields>,
     /// At the nodes and in the middles of smooth elements.
     pub mesh: Option<MeshFields>,
+    /// Forces at the ends and what else the settings ask for.
     pub details: Details,
 }
 
 /// Fields of ten-node elements.
 #[derive(Debug, Clone)]
 pub struct MeshFields {
+    /// Places of the nodes, from the corner of the specimen.
     pub nodes_mm: Vec<[f64; 3]>,
+    /// The ten nodes of each element.
     pub elements: Vec<Ten>,
+    /// Fields with values at the nodes.
     pub of_nodes: Vec<MeshArray>,
+    /// Fields with values in the elements' middles.
     pub of_elements: Vec<MeshArray>,
 }
 
@@ -134,11 +148,14 @@ pub struct MeshFields {
 pub struct MeshArray {
     /// With the unit, as `sed_mpa`.
     pub name: &'static str,
+    /// Values a node or element.
     pub components: usize,
+    /// Node by node, or element by element.
     pub values: Vec<f32>,
 }
 
 impl MeshArray {
+    /// A field of `components` values a node or element.
     pub fn new(name: &'static str, components: usize, values: Vec<f32>) -> MeshArray {
         MeshArray {
             name,
@@ -153,6 +170,7 @@ impl MeshArray {
 pub struct SiteFields {
     /// Places of the sites, from the corner of the specimen.
     pub at_mm: Vec<[f64; 3]>,
+    /// Displacement of each site.
     pub displacement_mm: Option<Vec<[f64; 3]>>,
     /// A site's energy over the volume of a whole site's cell.
     pub sed_mpa: Option<Vec<f64>>,

@@ -65,6 +65,7 @@ impl Deref for Job {
 }
 
 impl Job {
+    /// The solve by one discretisation.
     pub fn of<D: Discretisation + 'static>(case: D::Case) -> Job {
         Job(Box::new(Of::<D>(case)))
     }

@@ -24,8 +24,11 @@ pub enum CoarsenBy {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolveParams {
+    /// How the specimen is discretised.
     pub method: Method,
+    /// Young's modulus of the tissue.
     pub young_mpa: f64,
+    /// Poisson's ratio of the tissue.
     pub poisson: f64,
     /// How tissue differs from voxel to voxel. None: E and ν as above everywhere.
     pub material: Option<Material>,
@@ -39,6 +42,7 @@ pub struct SolveParams {
     pub strain: f64,
     /// Thickness of each grip; 0: the end planes.
     pub grip_mm: f64,
+    /// What is done to the specimen.
     pub load: Load,
     /// Bending and torsion: by how many degrees the ends turn against each other.
     pub angle_deg: f64,
@@ -46,10 +50,12 @@ pub struct SolveParams {
     pub ends: Ends,
     /// load = "stiffness": what the unit strains do on the faces.
     pub conditions: Conditions,
+    /// The load axis.
     pub axis: Axis,
     /// Relative algebraic error allowed in the headline modulus (0.001 is 0.1 %).
     #[serde(deserialize_with = "percent::deserialize")]
     pub tolerance: f64,
+    /// A solve that takes more is ended and marked as not converged.
     pub max_iterations: usize,
     /// voxel-fe: each voxel becomes this many elements along every axis.
     pub refine: usize,
@@ -59,6 +65,7 @@ pub struct SolveParams {
     pub smoothed_again: bool,
     /// voxel-fe: this many voxels along every axis become one element.
     pub coarsen: usize,
+    /// What becomes of such blocks.
     pub coarsen_by: CoarsenBy,
     /// geometry-fe: edge of the cells that elements are made in, in mm. None: from the struts' thickness.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -15,7 +15,9 @@ use crate::volume::Specimen;
 pub struct Moduli {
     /// The headline (see [`Solution::e_app_mpa`]).
     pub e_app_mpa: f64,
+    /// From twice the strain energy.
     pub from_energy_mpa: f64,
+    /// From the force at the ends.
     pub from_reaction_mpa: f64,
     /// Over all sites; for firm over the fully coordinated ones.
     pub from_stress_mpa: f64,
@@ -37,13 +39,19 @@ impl Moduli {
 /// A solved model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solved {
+    /// Lattice sites or elements that carry load.
     pub sites: usize,
     /// Volume of the model that carries load over TV.
     pub model_bv_tv: Option<f64>,
+    /// Those that exist but carry none.
     pub dropped: usize,
+    /// Degrees of freedom.
     pub unknowns: usize,
+    /// Iterations of the solver.
     pub iterations: usize,
+    /// Relative residual at the end.
     pub residual: f64,
+    /// How the solver ended.
     pub ended: Ended,
     /// [`Moduli::NONE`] under shear, bending and torsion.
     pub moduli: Moduli,

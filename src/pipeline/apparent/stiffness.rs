@@ -16,7 +16,9 @@ use rayon::prelude::*;
 /// Apparent stiffness matrix and statistics of its solves. Voigt order 11, 22, 33, 23, 13, 12, engineering shears, MPa.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stiffness {
+    /// Elements that carry load.
     pub elements: usize,
+    /// Elements that exist but carry none.
     pub dropped: usize,
     /// Of the load with the most.
     pub unknowns: usize,

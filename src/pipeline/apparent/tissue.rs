@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 pub enum Tissue {
     /// The same everywhere; nothing is kept per voxel.
     Uniform(Solid),
+    /// A modulus for each voxel.
     Mixed(Mixed),
 }
 

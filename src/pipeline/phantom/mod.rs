@@ -20,10 +20,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PhantomParams {
+    /// Edges of the box along x, y, z.
     pub size_mm: [f64; 3],
+    /// Edge of a voxel.
     pub spacing_mm: f64,
     /// Bone volume over total volume.
     pub bvtv: f64,
+    /// Equal seeds and settings give equal phantoms.
     pub seed: u64,
     /// Thickness of plates and rods.
     pub thickness_mm: f64,
@@ -33,6 +36,7 @@ pub struct PhantomParams {
     pub perforation: Option<f64>,
     /// Grey values of bone and of what surrounds it. Halfway lies 200 HU, the lower threshold of the lattice paper.
     pub bone_hu: f64,
+    /// Of what surrounds the bone.
     pub background_hu: f64,
     /// Standard deviation of the noise.
     pub noise_hu: f64,
@@ -176,7 +180,9 @@ fn range(key: &str, v: f64, low: f64, high: f64, advice: &str) -> Result<()> {
 /// What came out, measured on the clean mask.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PhantomSummary {
+    /// Along x, y, z.
     pub voxels: [usize; 3],
+    /// Bone volume fraction, 0 to 1.
     pub bv_tv: f64,
     /// 2 BV / BS.
     pub plate_thickness_mm: Option<f64>,
@@ -184,6 +190,7 @@ pub struct PhantomSummary {
     pub removed_voxels: u64,
     /// Whether a path through voxel faces leads from the first slice along z to the last.
     pub connects_z: bool,
+    /// Specks of bone that the scan has in addition; 0 before the scan is made.
     pub debris: u64,
 }
 
@@ -192,6 +199,7 @@ pub struct PhantomSummary {
 pub struct Phantom {
     /// 1 where bone. Of a random field one connected piece, no debris; of a body wherever a voxel's middle lies in it.
     pub mask: Volume<u8>,
+    /// The numbers of the mask.
     pub summary: PhantomSummary,
     body: Option<Body>,
 }

@@ -1,5 +1,6 @@
 //! Owns segmentation: place, smooth, threshold, volume of interest, connectivity, flat ends, in that order.
 
+#[doc(hidden)]
 pub mod laid;
 mod params;
 mod place;
@@ -7,6 +8,9 @@ mod region;
 mod summary;
 mod window;
 
+pub use crate::format::calibration::GreyUnit;
+pub use crate::image::array::headerless::Contents;
+pub use crate::measure::morphometry::Morphometry;
 pub use params::{Align, AlignBox, SegmentParams, Voi, shown};
 pub use place::Rotation;
 pub use summary::{SegmentSummary, Surface, implausible_voxels, refuse_impossible_voxels};
@@ -35,7 +39,9 @@ const MOST_LABELS: usize = 64;
 /// A segmented scan with its numbers.
 #[derive(Debug, Clone)]
 pub struct Segmented<'a> {
+    /// Mask, TV and, where they are kept, grey values.
     pub specimen: Specimen,
+    /// Its numbers and warnings.
     pub summary: SegmentSummary,
     /// Grey values on the specimen's grid: the scan as it was cropped, turned, resampled and rotated.
     pub scan: Cow<'a, Volume<f32>>,
@@ -52,6 +58,7 @@ pub fn segment<'a>(
 }
 
 /// The same for a scan in which voxels that are no measurement were hidden.
+#[doc(hidden)]
 pub fn segment_measured<'a>(
     name: &str,
     scan: &'a Volume<f32>,

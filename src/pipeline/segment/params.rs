@@ -11,12 +11,15 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "lowercase")]
 pub enum Voi {
+    /// The whole scan.
     #[default]
     Box,
     /// A cylinder along z. None: the largest that fits, centred.
     Cylinder {
+        /// None: the largest that fits.
         #[serde(default)]
         diameter_mm: Option<f64>,
+        /// x and y from the corner of the whole scan. None: the middle of the crop.
         #[serde(default)]
         center_mm: Option<[f64; 2]>,
     },
@@ -55,7 +58,9 @@ pub struct SegmentParams {
     pub raw: Option<Contents>,
     /// Of a Scanco scan's grey values, and so of the window. None: as stored, with a warning where a window is given.
     pub units: Option<GreyUnit>,
+    /// Lower end of the window. None: open.
     pub lower: Option<f64>,
+    /// Upper end of the window. None: open.
     pub upper: Option<f64>,
     /// Otsu's threshold instead of a window.
     pub otsu: bool,
@@ -63,6 +68,7 @@ pub struct SegmentParams {
     pub labels: Vec<i32>,
     /// σ of a Gaussian in voxels (of the resampled scan); 0 is off.
     pub gaussian_voxels: f64,
+    /// Which part of the scan is specimen.
     pub voi: Voi,
     /// First and past-the-last voxel along x, y, z.
     pub crop: Option<[[usize; 2]; 3]>,
@@ -72,6 +78,7 @@ pub struct SegmentParams {
     pub resample_mm: Option<[f64; 3]>,
     /// What is rotated to z; voxels become cubes of their shortest edge.
     pub align: Option<Align>,
+    /// What becomes of the box then.
     pub align_box: AlignBox,
     /// Cut both ends (along z) to planes with bone in every tile of this edge that holds any.
     pub plane_cut_mm: Option<f64>,

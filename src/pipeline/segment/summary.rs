@@ -9,10 +9,13 @@ use serde::{Deserialize, Serialize};
 /// What segmentation found, as plain numbers; the results part of `segment.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SegmentSummary {
+    /// Of the mask, along x, y, z.
     pub voxels: [usize; 3],
+    /// Edges of its voxels along x, y, z.
     pub spacing_mm: [f64; 3],
     /// The window in use, in the image's units; Otsu's threshold is a lower bound.
     pub lower: Option<f64>,
+    /// None where there is none.
     pub upper: Option<f64>,
     /// `window`, `otsu` or `labels`.
     pub threshold: String,
@@ -24,11 +27,13 @@ pub struct SegmentSummary {
     pub blur_voxels: Option<f64>,
     /// Range of the finite grey values before smoothing.
     pub grey_min: f64,
+    /// The upper end of that range.
     pub grey_max: f64,
     /// NaN and infinite voxels; they are pore.
     pub non_finite_voxels: u64,
     /// Voxels in the window, before the volume of interest and connectivity.
     pub selected_voxels: u64,
+    /// Voxels in the window that lie outside the volume of interest.
     pub outside_voi_voxels: u64,
     /// 6-connected components inside the volume of interest.
     pub components: u64,
@@ -39,11 +44,16 @@ pub struct SegmentSummary {
     /// What a plane cut took off the lower and the upper end.
     #[serde(default)]
     pub plane_cut_mm: Option<[f64; 2]>,
+    /// How the scan was rotated; None where it was not.
     #[serde(default)]
     pub rotation: Option<Rotation>,
+    /// What TV is, in words: box, cylinder, mask.
     pub tv_definition: String,
+    /// Volume of interest, pores included.
     pub tv_mm3: f64,
+    /// Bone volume.
     pub bv_mm3: f64,
+    /// Bone volume over TV, 0 to 1.
     pub bv_tv: f64,
     /// 2 BV / BS, see `measure::thickness`.
     pub mean_thickness_mm: Option<f64>,
@@ -53,6 +63,7 @@ pub struct SegmentSummary {
     /// How the threshold was chosen, where that is not plain.
     #[serde(default)]
     pub notes: Vec<String>,
+    /// What may be wrong with the scan or its settings.
     pub warnings: Vec<String>,
 }
 

@@ -11,7 +11,9 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct FoundBy {
+    /// The method of the row.
     pub method: Method,
+    /// None for a single solve by elements.
     pub boundary: Option<BoundaryRule>,
 }
 
@@ -19,6 +21,7 @@ pub struct FoundBy {
 const LIMIT: &str = "-extrapolated";
 
 impl FoundBy {
+    /// How a row was found.
     pub fn of(row: &Row) -> FoundBy {
         FoundBy {
             method: row.key.method,

@@ -10,10 +10,12 @@ use std::collections::BTreeMap;
 pub struct Targets(BTreeMap<String, f64>);
 
 impl Targets {
+    /// The error asked for under a condition; None where none was.
     pub fn of(&self, condition: &Condition) -> Option<f64> {
         self.0.get(&condition.in_words()).copied()
     }
 
+    /// Notes the error asked for under a condition.
     pub fn set(&mut self, condition: &Condition, target: f64) {
         self.set_in_words(condition.in_words(), target);
     }

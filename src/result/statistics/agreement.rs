@@ -8,22 +8,29 @@ use serde::Serialize;
 /// Differences `a − b` of pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct Agreement {
+    /// Number of pairs.
     pub n: usize,
+    /// Mean difference.
     pub bias: f64,
     /// Standard deviation of the differences.
     pub sd: f64,
     /// Limits of agreement: bias ∓ 1.96 sd.
     pub lower_limit: f64,
+    /// Bias plus 1.96 sd.
     pub upper_limit: f64,
     /// Two-sided paired t test of bias 0; None where the differences do not vary, so that there is nothing to test by.
     pub bias_p: Option<f64>,
     /// Differences over the mean of both, in percent: mean, standard deviation, limits of agreement.
     pub bias_percent: f64,
+    /// Their standard deviation.
     pub sd_percent: f64,
+    /// `bias_percent` less 1.96 `sd_percent`.
     pub lower_limit_percent: f64,
+    /// `bias_percent` plus 1.96 `sd_percent`.
     pub upper_limit_percent: f64,
     /// Slope of those over the mean of both, and its two-sided p; None where there is no line.
     pub slope_percent_per_mpa: Option<f64>,
+    /// Two-sided p of that slope 0.
     pub slope_p: Option<f64>,
 }
 

@@ -4,13 +4,18 @@ use super::{deviations, mean};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+/// One-way analysis of variance with repeated measures.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct Anova {
+    /// Specimens that all methods have.
     pub specimens: usize,
+    /// Number of methods.
     pub methods: usize,
+    /// Mean square between methods over that of the error.
     pub f: f64,
     /// Degrees of freedom of methods and of error.
     pub df_methods: usize,
+    /// Degrees of freedom of the error.
     pub df_error: usize,
     /// Sphericity assumed: differences between any two methods vary alike.
     pub p: f64,

@@ -7,6 +7,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// The exact distribution is used where one group has at most this many values and no two values are equal.
 const EXACT: usize = 8;
 
+/// The test's statistic and p.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct MannWhitney {
     /// Pairs in which the value of the first group is larger; equal ones count half.

@@ -5,11 +5,17 @@ use serde::Serialize;
 /// Quartiles interpolate linearly between order statistics (Hyndman and Fan's type 7, the default of R and NumPy).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct Quartiles {
+    /// Number of values.
     pub n: usize,
+    /// Least value.
     pub min: f64,
+    /// First quartile.
     pub q1: f64,
+    /// Second quartile.
     pub median: f64,
+    /// Third quartile.
     pub q3: f64,
+    /// Largest value.
     pub max: f64,
 }
 

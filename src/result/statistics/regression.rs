@@ -7,14 +7,21 @@ use serde::Serialize;
 /// `y = intercept + slope · x`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct Regression {
+    /// Number of points.
     pub n: usize,
+    /// In units of y over units of x.
     pub slope: f64,
+    /// In units of y.
     pub intercept: f64,
+    /// Coefficient of determination, 0 to 1.
     pub r2: f64,
+    /// In units of the slope.
     pub slope_standard_error: f64,
+    /// In units of y.
     pub intercept_standard_error: f64,
     /// Two-sided, of slope 0 and of intercept 0 (Student's t, n − 2 degrees of freedom).
     pub slope_p: f64,
+    /// Two-sided p of intercept 0.
     pub intercept_p: f64,
 }
 

@@ -8,12 +8,17 @@ use serde::Serialize;
 /// `sd` and the interval are None for a single value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct Summary {
+    /// Number of values.
     pub n: usize,
+    /// Mean of the values.
     pub mean: f64,
+    /// Standard deviation with n − 1.
     pub sd: Option<f64>,
     /// 95 % confidence interval of the mean (Student's t).
     pub mean_low: Option<f64>,
+    /// The upper end of that interval.
     pub mean_high: Option<f64>,
+    /// Quartiles as in [`quartiles`].
     pub median: f64,
 }
 

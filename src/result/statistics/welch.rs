@@ -7,20 +7,28 @@ use serde::Serialize;
 /// Differences are `a − b`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct Welch {
+    /// Difference of the means.
     pub difference: f64,
     /// 95 % confidence interval of the difference of the means.
     pub difference_low: f64,
+    /// The upper end of that interval.
     pub difference_high: f64,
+    /// Welch's t.
     pub t: f64,
+    /// Degrees of freedom (Welch and Satterthwaite).
     pub freedom: f64,
+    /// Two-sided p of no difference.
     pub p: f64,
 }
 
 /// Standardised difference with its 95 % interval from the noncentral t distribution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct HedgesG {
+    /// Hedges' g.
     pub g: f64,
+    /// The lower end of its interval.
     pub g_low: f64,
+    /// The upper end.
     pub g_high: f64,
 }
 

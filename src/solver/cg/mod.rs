@@ -44,6 +44,7 @@ impl Default for CgParams {
 /// far below the stiffness of any body that bears load and far above double precision's rounding.
 pub(super) const MECHANISM_ENERGY: f64 = 1e-10;
 
+/// How a solve by conjugate gradients ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ended {
     /// The estimated energy error met its tolerance.
@@ -52,6 +53,7 @@ pub enum Ended {
     ResidualTolerance,
     /// The energy fell to nothing: what connects the held unknowns only turns and shifts.
     Mechanism,
+    /// The settings' number of iterations was reached.
     IterationLimit,
     /// `pᵀAp <= 0`, a value that is not finite, or an energy other than what the iterations came to: the operator or
     /// preconditioner is not symmetric and positive on the free unknowns.
@@ -59,6 +61,7 @@ pub enum Ended {
 }
 
 impl Ended {
+    /// Whether the result can be used.
     pub fn converged(self) -> bool {
         matches!(
             self,
@@ -102,7 +105,9 @@ impl<const D: usize> Functional<D> for NoGoal {
 /// Progress, reported once an iteration.
 #[derive(Debug, Clone, Copy)]
 pub struct CgStep {
+    /// Number of the iteration, from 1.
     pub iteration: usize,
+    /// `‖r‖ / ‖r₀‖`.
     pub residual: f64,
     /// Estimated relative error of the energy, or of the goal, once there is one.
     pub energy_error: Option<f64>,

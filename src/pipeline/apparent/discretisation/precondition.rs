@@ -10,6 +10,7 @@ use crate::solver::nested::TwoLevel;
 
 /// What a preconditioner can be made of.
 pub trait Precondition {
+    /// The preconditioner, which leaves held unknowns alone.
     fn precondition<'a>(
         &'a self,
         held: &Held,

@@ -8,6 +8,7 @@ use crate::solver::load_step::{Balanced, Bounds, StepParams, Workspace, balance,
 
 /// Supports and load. The load grows from 0 to 1.
 pub struct Loading<'a> {
+    /// Which unknowns are held.
     pub held: &'a Held,
     /// Displacements of the elastic body under the whole load, those of the supports among them.
     pub elastic: &'a [[f64; 3]],
@@ -18,24 +19,30 @@ pub struct Loading<'a> {
 /// How the load grows, and how exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stepping {
+    /// Even steps from 0 to the whole load.
     pub steps: usize,
     /// A step is halved so many times at most.
     pub halvings: u32,
+    /// How exactly each step is balanced.
     pub params: StepParams,
 }
 
 /// The end of one step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Step {
+    /// Share of the whole load, 0 to 1.
     pub load: f64,
     /// Work per unit of the load, N mm: forces along the change of the displacements.
     pub conjugate_nmm: f64,
     /// Since the start.
     pub work_nmm: f64,
+    /// By plastic flow since the start.
     pub dissipated_nmm: f64,
     /// Stored now.
     pub elastic_nmm: f64,
+    /// Corrections of the displacements in this step.
     pub newton_iterations: usize,
+    /// Iterations of conjugate gradients in this step.
     pub iterations: usize,
     /// Looks at the forces, each about as long as an iteration.
     pub evaluations: usize,
@@ -48,10 +55,13 @@ pub struct Step {
 /// Where a body is between two steps: all that a stopped solve resumes from.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct History {
+    /// The steps so far.
     pub steps: Vec<Step>,
+    /// States of the elements that have ever flowed.
     pub states: Vec<State>,
     /// Displacements now and at the step before, mm.
     pub u: Vec<[f64; 3]>,
+    /// Displacements at the step before, mm.
     pub before: Vec<[f64; 3]>,
     /// Halvings of the step to come.
     pub halved: u32,
@@ -68,6 +78,7 @@ pub enum Outcome {
 }
 
 impl History {
+    /// A body at rest of this many sites.
     pub fn new(sites: usize) -> Self {
         History {
             u: vec![[0.0; 3]; sites],

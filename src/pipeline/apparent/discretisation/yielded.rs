@@ -6,11 +6,13 @@ use crate::result::strength::Yielding;
 
 /// A body at the end of its load steps.
 pub struct Yielded {
+    /// Displacements of all sites, in mm.
     pub u: Vec<[f64; 3]>,
     /// Nodal forces, N.
     pub force: Vec<[f64; 3]>,
     /// Equivalent plastic strain of the elements that have flowed, by index in the mesh's grid, rising.
     pub plastic: Vec<(usize, f32)>,
+    /// Its stress-strain curve and what has flowed.
     pub yielding: Yielding,
     /// Of conjugate gradients, in all steps.
     pub iterations: usize,

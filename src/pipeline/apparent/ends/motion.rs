@@ -11,7 +11,9 @@ use crate::volume::Specimen;
 /// The ends' motion of one specimen between its innermost gripped planes.
 #[derive(Debug, Clone, Copy)]
 pub struct EndMotion {
+    /// The load axis.
     pub axis: Axis,
+    /// What the ends do against each other.
     pub motion: Motion,
     /// Along the axis; the displacement also of ends that slide.
     pub loaded: Loaded,

@@ -6,11 +6,14 @@ use crate::result::details::EndForces;
 /// One end of a specimen along its load axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
+    /// The end of smaller coordinates.
     Lower,
+    /// The end of larger coordinates.
     Upper,
 }
 
 impl End {
+    /// The word of `reactions.csv`.
     pub fn name(self) -> &'static str {
         match self {
             End::Lower => "lower",
@@ -56,6 +59,7 @@ pub fn reactions(
     })
 }
 
+/// The vector product.
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);

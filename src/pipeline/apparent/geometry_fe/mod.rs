@@ -48,6 +48,7 @@ pub struct GeometryModel {
 }
 
 impl GeometryModel {
+    /// The mesh with its stiffness.
     pub fn elements(&self) -> &Tet10 {
         &self.model
     }
@@ -57,6 +58,7 @@ impl GeometryModel {
         self.young_mpa
     }
 
+    /// Poisson's ratio of the tissue.
     pub fn poisson(&self) -> f64 {
         self.poisson
     }
@@ -70,6 +72,7 @@ impl GeometryModel {
         )
     }
 
+    /// Distance of the innermost gripped places, and displacement of one grip against the other.
     pub fn gauge_and_displacement_mm(&self) -> [f64; 2] {
         [
             self.motion.loaded.gauge_mm,

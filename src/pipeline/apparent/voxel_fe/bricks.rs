@@ -41,7 +41,9 @@ impl Keep {
 // One is made a solve: its size on the stack does not matter.
 #[allow(clippy::large_enum_variant)]
 pub enum Bricks {
+    /// All elements are alike.
     Homogeneous(Hex8),
+    /// A factor, and a kind, for each element.
     Heterogeneous(Heterogeneous),
 }
 
@@ -81,6 +83,7 @@ impl Bricks {
         }
     }
 
+    /// The elements and their nodes.
     pub fn mesh(&self) -> &VoxelMesh {
         match self {
             Bricks::Homogeneous(model) => &model.mesh,

@@ -3,20 +3,33 @@
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
+/// The analytic bodies: a network is what lies on one side of a periodic surface, a sheet a wall along it; then struts, and plates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyKind {
+    /// One side of the gyroid.
     GyroidNetwork,
+    /// A wall along the gyroid.
     GyroidSheet,
+    /// One side of Schwarz's P surface.
     SchwarzPNetwork,
+    /// A wall along Schwarz's P surface.
     SchwarzPSheet,
+    /// One side of Schwarz's D surface.
     SchwarzDNetwork,
+    /// A wall along Schwarz's D surface.
     SchwarzDSheet,
+    /// Struts along the edges of cubes.
     Cubic,
+    /// Struts from the middle of a cube to its corners.
     Bcc,
+    /// Struts between nearest nodes of a face-centred lattice.
     Octet,
+    /// Struts along the edges of truncated octahedra.
     Kelvin,
+    /// Struts along the edges of Voronoi cells about scattered seeds.
     Foam,
+    /// Parallel plates.
     Plates,
 }
 
@@ -35,16 +48,23 @@ pub enum Orientation {
     /// By the seed.
     Random,
     /// The third axis this many degrees from z, towards this many from x.
-    Tilted { tilt: f64, azimuth: f64 },
+    Tilted {
+        /// Degrees from z.
+        tilt: f64,
+        /// Degrees from x.
+        azimuth: f64,
+    },
 }
 
 /// An analytic body and how it lies in the scan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BodyParams {
+    /// What it is made of.
     pub kind: BodyKind,
     /// Edge of the cell that repeats; mean distance of a foam's cells; from plate to plate.
     pub cell_mm: f64,
+    /// How its axes lie in the box.
     pub orientation: Orientation,
     /// Width over which struts' surfaces flow into one another, in mean radii; 0 leaves joints sharp.
     pub fillet: f64,

@@ -35,7 +35,9 @@ fn files(folder: &Path, ends: &[&str]) -> Vec<PathBuf> {
 
 /// Every Markdown page that a reader may open, relative to the root, with its text.
 fn pages() -> Vec<(PathBuf, String)> {
-    let mut paths = vec![root().join("README.md"), root().join("paper.md")];
+    let mut paths = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "paper.md"]
+        .map(|name| root().join(name))
+        .to_vec();
     for folder in ["docs", "reports", "pipelines", "sample_data"] {
         paths.extend(files(&root().join(folder), &[".md"]));
     }

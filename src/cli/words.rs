@@ -197,6 +197,42 @@ fn shape(word: &str) -> Result<Voi, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bonepd_ct::physics::material::Material;
+
+    /// What a recipe holds of a law.
+    #[derive(serde::Serialize)]
+    struct Recipe {
+        law: Law,
+    }
+
+    #[test]
+    fn laws_of_density_are_read_and_said_alike() {
+        for (word, said) in [
+            ("power:6850,1.49", "power:6850;1.49"),
+            ("linear:25,-5830", "linear:25;-5830"),
+            ("homminga:1200", "homminga:1200;1.7"),
+            ("homminga:1200,2", "homminga:1200;2"),
+            (
+                "labels:100=5000,127=9000/0.2",
+                "labels:100=5000;127=9000/0.2",
+            ),
+        ] {
+            let law = material(word).unwrap();
+            let text = toml::to_string(&Recipe { law: law.clone() }).unwrap();
+            let read: Material = toml::from_str(&text).unwrap();
+            assert_eq!((read.law.clone(), read.words().as_str()), (law, said));
+        }
+        for word in [
+            "power",
+            "power:1",
+            "linear:1,2,3",
+            "homminga:",
+            "labels:a=1",
+            "log:1,2",
+        ] {
+            assert!(material(word).is_err(), "{word}");
+        }
+    }
     use bonepd_ct::pipeline::lattice::Structure;
 
     #[test]

@@ -193,6 +193,32 @@ impl Material {
     }
 }
 
+/// The law that [`Material::words`] said, as a reader of a paper reads it: `E = 6850 ρ^1.49`. The words themselves where there is no formula.
+pub fn formula(words: &str) -> String {
+    let (law, density) = match words.split_once(" of ") {
+        Some((law, density)) => (law, density.split_once(';')),
+        None => (words, None),
+    };
+    let formula = match law
+        .split_once(':')
+        .map(|(n, rest)| (n, rest.split_once(';')))
+    {
+        Some(("power", Some((c, n)))) => format!("E = {c} ρ^{n}"),
+        Some(("linear", Some((a, b)))) => match b.strip_prefix('-') {
+            Some(b) => format!("E = {a} ρ − {b}"),
+            None => format!("E = {a} ρ + {b}"),
+        },
+        Some(("homminga", Some((full, n)))) => format!("E = E_full (ρ / {full})^{n}"),
+        _ => return words.to_owned(),
+    };
+    match density {
+        Some((slope, intercept)) => {
+            format!("{formula}, where ρ is {slope} times the voxel's value plus {intercept}")
+        }
+        None => format!("{formula}, where ρ is the voxel's value"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -225,6 +251,31 @@ mod tests {
         assert_eq!(material.young_mpa(0.0, 1.0), Some(10.0));
         // Negative densities have no modulus by a power, rather than NaN.
         assert_eq!(e(power, -0.5), 0.0);
+    }
+
+    #[test]
+    fn a_paper_reads_formulas() {
+        let mut material = Material::new(Law::Linear {
+            slope: 25.0,
+            intercept: -5830.0,
+        });
+        material.density = [0.5, 10.0];
+        assert_eq!(
+            formula(&material.words()),
+            "E = 25 ρ − 5830, where ρ is 0.5 times the voxel's value plus 10"
+        );
+        let homminga = Law::Homminga {
+            full: 1200.0,
+            exponent: 1.7,
+        };
+        assert_eq!(
+            formula(&Material::new(homminga).words()),
+            "E = E_full (ρ / 1200)^1.7, where ρ is the voxel's value"
+        );
+        assert_eq!(
+            formula("labels:100=5000;127=9000"),
+            "labels:100=5000;127=9000"
+        );
     }
 
     #[test]

@@ -193,7 +193,10 @@ const ROWS: &[RowCase] = &[
     ),
     (
         |r| r.key.material = Some("power:6850;1.49".to_owned()),
-        &["followed the law power:6850;1.49", "The source of the law"],
+        &[
+            "followed the law E = 6850 ρ^1.49, where ρ is",
+            "The source of the law",
+        ],
         &["8748 MPa", "everywhere"],
     ),
     (

@@ -4,6 +4,7 @@ use super::Answered;
 use super::words::{by_scan, list, scans, setting, settings, size};
 use crate::discretisation::lattice::stencil::Structure;
 use crate::physics::hex8::element::{FULL_POISSON, MEAN_POISSON};
+use crate::physics::material::formula;
 use crate::report::{Report, distinct};
 use crate::result::condition::{Condition, Tissue};
 use crate::result::row::Row;
@@ -238,7 +239,8 @@ pub fn tissue(condition: &Condition, answered: &[Answered]) -> String {
             setting(*young)
         ),
         Tissue::Law(law) => format!(
-            "Bone tissue was isotropic and linear elastic; its Young's modulus in MPa followed the law {law} from voxel to voxel, with a Poisson's ratio of {nu} where the law gives none."
+            "Bone tissue was isotropic and linear elastic; its Young's modulus in MPa followed the law {} from voxel to voxel, with a Poisson's ratio of {nu} where the law gives none.",
+            formula(law)
         ),
     };
     let yields = distinct(

@@ -2,12 +2,13 @@
 
 mod components;
 mod numbers;
+mod unused;
 
 use super::conduction::CONDUCTED;
 use super::setup::Setup;
 use super::solid::{DISPLACEMENT, Solid};
 use super::steady::loads;
-use super::{Conduction, Elasticity, Molecular, Problem, fracture, unused};
+use super::{Conduction, Elasticity, Molecular, Problem, fracture};
 use crate::error::{Error, Result};
 use crate::scene::setting::{Inputs, Setting};
 

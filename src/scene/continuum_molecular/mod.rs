@@ -14,7 +14,6 @@ pub mod solid;
 pub mod steady;
 pub mod sweep;
 mod tensors;
-mod unused;
 mod warnings;
 pub mod window;
 

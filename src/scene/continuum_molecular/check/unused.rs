@@ -1,10 +1,10 @@
 //! Owns the refusal of what a scene names in addition to its problem, but its solution would not use.
 
-use super::sweep::Parameter;
-use super::{Known, KnownField, Molecular, Problem};
 use crate::discretisation::plane::geometry::Geometry;
 use crate::error::{Error, Result};
 use crate::scene::conditions::Time;
+use crate::scene::continuum_molecular::sweep::Parameter;
+use crate::scene::continuum_molecular::{Known, KnownField, Molecular, Problem};
 use crate::scene::setting::Setting;
 
 const OUT: &str = "leave it out";

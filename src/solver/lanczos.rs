@@ -19,7 +19,8 @@ pub struct Found {
     pub settled: bool,
 }
 
-/// Vectors of a Lanczos basis for each wanted mode, and in any case.
+/// Vectors of a Lanczos basis for each wanted mode, and in any case. They bound memory and the cost of orthogonalisation, not the
+/// accuracy: [`Found::settled`] says whether they were enough.
 const LIMIT: [usize; 2] = [20, 60];
 /// Share of an eigenvalue (of the inverse) by which it may differ from another and still count as the same.
 const SAME: f64 = 1e-9;
@@ -141,7 +142,8 @@ fn run(
     }
 }
 
-/// A vector without symmetry, so that every mode is in it, and another for each start.
+/// A vector without symmetry, so that every mode is in it, and another for each start. The steps are those of Roberts' low-discrepancy
+/// sequences R2 and R3 (<https://extremelearning.com.au/unreasonable-effectiveness-of-quasirandom-sequences/>): irrational, and unlike.
 fn start_vector(n: usize, start: usize) -> Vec<f64> {
     let step = [0.754_877_666, 0.569_840_291, 0.819_172_513, 0.671_043_607][start % 4];
     (0..n)

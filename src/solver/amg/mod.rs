@@ -231,7 +231,8 @@ const CYCLE_MARGIN: f32 = 1.05;
 
 fn smoothing<const D: usize>(level: &impl Level<D>, degree: usize) -> Smoothing {
     let largest = level.eigenvalue_bound().max(f32::MIN_POSITIVE);
-    // What a polynomial of this degree damps well: its interval begins at about 1 / (2 degree)².
+    // The interval begins at about 1 / (degree + 1)² of the largest eigenvalue. From there on Chebyshev's polynomials of degree 1 to 4
+    // leave 0.60, 0.43, 0.41 and 0.38 of a component at most: 1 / T_d((r + 1) / (r − 1)).
     let range = [4.0, 8.0, 16.0, 25.0][degree.clamp(1, 4) - 1];
     Smoothing {
         smoother: Chebyshev::new(largest, range, degree),

@@ -7,6 +7,10 @@ use faer::linalg::triangular_solve::{
 };
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
+/// Iterations of a solve at most. S is a good preconditioner of S less a change of a few of its rows: a solve takes tens of iterations, or
+/// the rest is nearly singular, and the caller is better served by a new S.
+const MOST_ITERATIONS: usize = 200;
+
 /// The Schur complement S of a factorised matrix on `size` rows, kept as its dense Cholesky factor.
 pub struct SchurComplement {
     factor: Mat<f64>,
@@ -56,7 +60,7 @@ impl SchurComplement {
         change(d, &mut r);
         let (mut p, mut sp) = (vec![0.0; n], vec![0.0; n]);
         let mut before = f64::INFINITY;
-        for iterations in 0..200 {
+        for iterations in 0..MOST_ITERATIONS {
             let mut z = r.clone();
             self.inverse(&mut z);
             let rz = inner(&r, &z);
@@ -87,7 +91,7 @@ impl SchurComplement {
             }
         }
         ZoneInfo {
-            iterations: 200,
+            iterations: MOST_ITERATIONS,
             converged: false,
         }
     }

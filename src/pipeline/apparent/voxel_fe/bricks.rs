@@ -15,7 +15,7 @@ use crate::pipeline::apparent::tissue::{Mixed, Tissue};
 use crate::volume::Specimen;
 use std::ops::Range;
 
-/// Bone fraction of a coarsened voxel below which it is no element.
+/// Bone fraction of a coarsened voxel below which it is no element. A choice, as for weighted sites of lattices.
 pub(super) const LEAST_FRACTION: f32 = 0.02;
 
 /// Which elements carry load.

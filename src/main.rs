@@ -12,7 +12,7 @@ fn main() -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::NotConverged) => {
             put(
-                "warning: a solve did not converge or did not reach the error target: its results are written, and its rows say so",
+                "warning: not all that was asked for was reached (see the warnings above): the results are written, and their rows say so",
             );
             ExitCode::from(1)
         }

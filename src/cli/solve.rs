@@ -246,7 +246,7 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
         }
     };
     if !session.dry_run {
-        bonepd_ct::command::answer::keep(&args.dir, &rows, args.error)?;
+        say_where_another_answers(&args.dir, &rows, args.error, session)?;
     }
     if json {
         print_json(&rows);
@@ -257,6 +257,29 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
             false => Outcome::Done,
         },
     )
+}
+
+/// Keeps the answer of the scan, and says so where a row of an earlier solve stays its answer.
+fn say_where_another_answers(
+    dir: &Path,
+    rows: &[Row],
+    target: Option<f64>,
+    session: &Session,
+) -> Result<()> {
+    use bonepd_ct::command::{answer, in_words::answer_in_words};
+    answer::keep(dir, rows, target)?;
+    let Some(line) = answer::line(dir, rows)? else {
+        return Ok(());
+    };
+    let is_own = |row: &Row| row.e_app_mpa() == line.e_app_mpa && row.key.lp_mm == line.element_mm;
+    if line.e_app_mpa.is_some() && !rows.iter().any(is_own) {
+        session.result(format!(
+            "the answer of {} stays that of an earlier solve: {}",
+            line.scan,
+            answer_in_words(&line)
+        ));
+    }
+    Ok(())
 }
 
 fn export(

@@ -95,9 +95,13 @@ pub fn estimate(input: &Path, spacing_mm: Option<[f64; 3]>, recipe: &Recipe) -> 
         volume_mm3: size_mm.map(|size| size.iter().product()),
     };
     let (mut model_bytes, mut time_s) = (0.0f64, Some(0.0));
-    for solve in recipe.solves() {
-        for job in jobs(&recipe.lattice, &solve) {
-            let cost = job.cost(&solve, known)?;
+    for params in recipe
+        .solves()
+        .iter()
+        .flat_map(|solve| steps(recipe, solve))
+    {
+        for job in jobs(&recipe.lattice, &params) {
+            let cost = job.cost(&params, known)?;
             model_bytes = model_bytes.max(cost.bytes[1]);
             time_s = time_s.zip(cost.time_s).map(|(a, b)| a + b);
         }
@@ -108,6 +112,14 @@ pub fn estimate(input: &Path, spacing_mm: Option<[f64; 3]>, recipe: &Recipe) -> 
         time_s,
         no_bone: false,
     })
+}
+
+/// The solves of one load: the most that an error target may take, or the one that the recipe says.
+fn steps(recipe: &Recipe, solve: &SolveParams) -> Vec<SolveParams> {
+    match recipe.error {
+        Some(target) => ladder::expected(target, solve),
+        None => vec![solve.clone()],
+    }
 }
 
 fn count(n: [usize; 3]) -> f64 {
@@ -126,10 +138,7 @@ fn reading_bytes(recipe: &Recipe) -> f64 {
 /// # Errors
 /// Settings that do not fit the specimen.
 pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Result<Estimate> {
-    let steps = match recipe.error {
-        Some(target) => ladder::expected(target, &recipe.solve),
-        None => vec![recipe.solve.clone()],
-    };
+    let steps = steps(recipe, &recipe.solve);
     let tissue = Tissue::of(specimen, &recipe.solve)?;
     let prepared = Prepared {
         specimen,

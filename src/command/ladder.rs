@@ -12,10 +12,10 @@ pub const ONE_REFINEMENT: f64 = 0.05;
 /// Voxels an element along each axis, tried in turn where one element a voxel does not fit into memory.
 pub const COARSENED: [usize; 3] = [2, 3, 4];
 
-/// A stated error that one element a voxel can meet. Smaller targets climb on.
-const MET_BY_VOXELS: f64 = 0.15;
+/// A stated error that one element a voxel meets on nearly every scan. Of smaller targets it may not, and finer elements follow.
+const MET_BY_VOXELS: f64 = 0.3;
 
-/// What `--error` can be expected to solve, the largest model last.
+/// The most that `--error` can be expected to solve, the largest model last.
 pub fn expected(target: f64, params: &SolveParams) -> Vec<SolveParams> {
     if params.plasticity.is_some() {
         return vec![split_voxels(params, 1), split_voxels(params, 2)];
@@ -23,6 +23,9 @@ pub fn expected(target: f64, params: &SolveParams) -> Vec<SolveParams> {
     let mut steps = vec![voxel_fe(params, 1, 1)];
     if target < MET_BY_VOXELS {
         steps.extend([smoothed_again(params), voxel_fe(params, 1, REFINED[0])]);
+    }
+    if target < ONE_REFINEMENT {
+        steps.push(voxel_fe(params, 1, REFINED[1]));
     }
     steps
 }

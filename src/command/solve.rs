@@ -287,6 +287,9 @@ impl OpenScan {
             JobResult::Modulus(solved, mut recorded) => {
                 let mut row = with_recorded(solved.row(blank.clone()), &recorded);
                 self.state(&mut row, recorded.euler);
+                if row.is_disconnected() {
+                    row.state_no_errors();
+                }
                 let stem = format!("{}-{}", name(&blank.key).replace(' ', "-"), blank.key.lp_mm);
                 let details = std::mem::take(&mut recorded.details);
                 let fields = Fields::of(stem, recorded, specimen::axes(&self.dir));

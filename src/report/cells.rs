@@ -90,6 +90,7 @@ fn head_of(field: &str) -> String {
         "q1" => "first quartile",
         "q3" => "third quartile",
         "sd" => "SD",
+        "lp_mm" => "LP or element (mm)",
         "slope_p" => "p of slope",
         "intercept_p" => "p of intercept",
         "bias_p" => "p of bias",

@@ -37,7 +37,8 @@ fn methods(samples: &[Sample]) -> Figure {
         stem: "methods".to_owned(),
         folded: true,
         title: "Apparent modulus by method".to_owned(),
-        caption: "Points: scans, each at its finest lattice parameter; line: median.".to_owned(),
+        caption: "Points: scans, each at its finest lattice parameter or element; line: median."
+            .to_owned(),
         y: Axis::linear("apparent modulus (MPa)"),
         content: Content::Groups(samples.iter().map(group).collect()),
         ..Figure::default()

@@ -142,15 +142,19 @@ fn convergence_of(scan: &str, solved: &[SolvedRow]) -> Figure {
         let level = members[0].e_app_mpa;
         vec![Point::new(0.0, level), Point::new(widest, level)]
     }));
+    let limits = match levels.is_empty() {
+        true => "",
+        false => "; horizontal lines: limits",
+    };
     Figure {
         stem: format!("convergence-{}", file_name(scan)),
         scan: Some(scan.to_owned()),
         title: format!("Convergence of {scan}"),
         caption: format!(
-            "Apparent modulus against lattice parameter (element size for voxel FE). Bars: stated error, cut off at 0; horizontal lines: limits.{}",
+            "Apparent modulus against lattice parameter (element size for voxel FE). Bars: stated error, cut off at 0{limits}.{}",
             tissue(&found)
         ),
-        x: Axis::linear("lattice parameter (mm)"),
+        x: Axis::linear("lattice parameter or element (mm)"),
         y: Axis::linear("apparent modulus (MPa)"),
         content: Content::Curves(curves_),
         ..Figure::default()

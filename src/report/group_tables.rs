@@ -70,7 +70,6 @@ pub fn comparisons_table(groups: &Groups) -> Table {
 }
 
 /// What the stated errors of single scans do to a comparison, in words.
-pub const ON_ERRORS: &str = "Errors of single scans that differ by chance are part of the spread within a group already, so the tests and the \
-    interval hold them. An error that all scans share (one method errs the same way in all of them) is in no interval: where it is the same share of \
-    every modulus, ratios and tests stay as they are. The widened interval is the worst case, all scans of one group too high and all of the other too \
-    low by their stated errors.";
+pub const ON_ERRORS: &str = "Random errors of single scans are already in the spread within a group, so tests and intervals include them. No interval includes an \
+    error that all scans share. If it is the same percentage of every modulus, ratios and tests do not change. The widened interval is the worst case: all \
+    scans of one group too high and all of the other too low by their stated errors.";

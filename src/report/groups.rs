@@ -62,9 +62,12 @@ struct Quantity {
     error: fn(&AnswerLine) -> Option<f64>,
 }
 
+/// The first quantity.
+pub const MODULUS: &str = "E_app (MPa)";
+
 const QUANTITIES: [Quantity; 3] = [
     Quantity {
-        name: "E_app (MPa)",
+        name: MODULUS,
         value: |a| a.e_app_mpa,
         error: |a| a.error_mpa,
     },

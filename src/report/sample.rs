@@ -168,7 +168,8 @@ fn lacking(samples: &[Sample], scans: &[&str]) -> Option<String> {
     let lacks: Vec<String> = scans
         .iter()
         .filter_map(|scan| {
-            let without = samples.iter().filter(|s| s.of(scan).is_none());
+            let compared = samples.iter().filter(|s| s.cases.len() >= LEAST_SCANS);
+            let without = compared.filter(|s| s.of(scan).is_none());
             let methods: Vec<&str> = without.map(|s| s.method.as_str()).collect();
             (!methods.is_empty()).then(|| format!("{scan} (no converged {})", methods.join("; ")))
         })
@@ -182,9 +183,15 @@ fn lacking(samples: &[Sample], scans: &[&str]) -> Option<String> {
             few.join("; ")
         ),
     };
-    let line =
-        "Statistics compare two methods over the scans that have both, so n differs; left out";
-    (!lacks.is_empty()).then(|| format!("{line}: {}{few}", lacks.join(", ")))
+    let line = "Statistics compare two methods over the scans that have both";
+    match (lacks.is_empty(), few.is_empty()) {
+        (true, true) => None,
+        (true, false) => Some(format!("{line}{few}")),
+        _ => Some(format!(
+            "{line}, so n differs; left out: {}{few}",
+            lacks.join(", ")
+        )),
+    }
 }
 
 #[cfg(test)]

@@ -78,7 +78,8 @@ impl Line {
         };
         *modulus = row.e_app_mpa();
         *ratio = row.e_app_mpa().map(|e| e / row.key.young_mpa);
-        if model != Model::Ffb {
+        // Times of means and limits are those of their solves.
+        if !row.key.is_derived() {
             self.wall_s = match (self.wall_s, row.wall_s()) {
                 (Some(a), Some(b)) => Some(a + b),
                 (a, b) => a.or(b),

@@ -207,7 +207,10 @@ fn lattice_limit(levels: &[Level], finest: &Row) -> Option<(f64, f64, String)> {
         "limit of {} lattices at LP {} mm, order 2 in LP ({}); parts of the error in MPa: step from the finest {step:.3}, scatter {scatter:.3}, voxels {voxels:.3}, few struts {struts:.3}",
         BoundaryRule::Graded.method_name(finest.key.structure),
         sizes.join(", "),
-        fitted_order(levels).map_or("none could be fitted".into(), |p| format!("fitted {p:.1}")),
+        fitted_order(levels).map_or(
+            "assumed: the values give no order of their own".into(),
+            |p| format!("fitted {p:.1}")
+        ),
     );
     Some((
         e,

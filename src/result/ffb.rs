@@ -61,7 +61,7 @@ fn only_one_carries(a: &Row, b: &Row) -> bool {
 /// reaction and mean stress, which firm and floppy lattices do not share.
 fn mean_row(a: &Row, b: &Row) -> Row {
     let solved = a.solved.as_ref().zip(b.solved.as_ref());
-    Row {
+    let mut row = Row {
         key: Settings {
             boundary: Some(BoundaryRule::Ffb),
             ..a.key.clone()
@@ -80,7 +80,11 @@ fn mean_row(a: &Row, b: &Row) -> Row {
             note: note(a, b),
             ..a.marks.clone()
         },
+    };
+    if row.is_disconnected() {
+        row.state_no_errors();
     }
+    row
 }
 
 fn mean(a: &Solution, b: &Solution) -> Solution {

@@ -134,6 +134,16 @@ impl Row {
         [s.algebraic_error_mpa, model.map(|(d, shape)| d + shape)]
     }
 
+    /// Takes all stated errors out of the row.
+    pub fn state_no_errors(&mut self) {
+        if let Some(solved) = &mut self.solved {
+            solved.algebraic_error_mpa = None;
+            solved.algebraic_error_percent = None;
+            solved.discretization_error_mpa = None;
+            solved.shape_error_mpa = None;
+        }
+    }
+
     /// Everything that is stated of the modulus, in MPa: algebraic, discretisation and shape error. None unless the last two
     /// are known. None where no bone joins the loaded faces: a threshold alone can change that.
     pub fn error_mpa(&self) -> Option<f64> {

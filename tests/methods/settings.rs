@@ -483,7 +483,7 @@ fn a_cohort_says_where_its_scans_differ() {
     known.segmented[2].threshold = Threshold::Otsu { at: Some(99.0) };
     let text = section(&rows, &known);
     for words in [
-        "4 scans of 3 subjects in groups (control: 2, OA: 2; scans) were analysed",
+        "4 scans of 3 subjects in 2 groups: control (2 scans of 2 subjects) and OA (2 scans of 1 subject), were analysed",
         "1 further scan could not be analysed.",
         "was 0.0195 and 0.025 mm.",
         "(σ = 0.8 voxels) (of a and c). Grey values were not filtered (of b).",

@@ -31,7 +31,7 @@ pub struct PhantomArgs {
     /// Voxel size in mm
     #[arg(long, value_name = "H", value_parser = words::positive)]
     spacing_mm: f64,
-    /// Bone volume over total volume, between 0.02 and 0.7
+    /// Bone volume over total volume of the bone that one piece holds, between 0.02 and 0.7; what is printed counts all bone
     #[arg(long, value_name = "F", value_parser = words::positive)]
     bvtv: f64,
     /// Another seed, another specimen

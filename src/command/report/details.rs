@@ -10,6 +10,8 @@ use std::path::Path;
 /// A line with the load that it is of.
 #[derive(Serialize)]
 struct Shown<'a, T> {
+    /// Lattice parameter or element.
+    lp_mm: f64,
     load: Load,
     young_mpa: f64,
     sed: Option<Sed>,
@@ -53,6 +55,7 @@ pub(super) fn tables(dir: &Path) -> Vec<(String, Table)> {
 fn table<T: Serialize>(all: &[(Settings, Details)], lines: impl Fn(&Details) -> &[T]) -> Table {
     let shown = all.iter().flat_map(|(key, details)| {
         lines(details).iter().map(move |says| Shown {
+            lp_mm: (key.lp_mm * 1e5).round() / 1e5,
             load: key.load,
             young_mpa: key.young_mpa,
             sed: key.sed,

@@ -104,6 +104,7 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
     } = sources;
     let mut report = assemble(rows, answers, &strength(rows, dirs), params);
     report.notes.extend(same_masks(rows, dirs));
+    report.notes.extend(unlike_thresholds(rows, dirs));
     let failed = failures.iter().map(|f| {
         let reason = f.reason.lines().next().unwrap_or_default();
         format!("{}: failed, no results: {reason}", f.scan)
@@ -228,6 +229,33 @@ fn same_masks(rows: &[Row], dirs: &[PathBuf]) -> Vec<String> {
             )
         })
         .collect()
+}
+
+/// Says so where a threshold was given and scans differ in it.
+fn unlike_thresholds(rows: &[Row], dirs: &[PathBuf]) -> Option<String> {
+    let mut found: Vec<(String, Vec<String>)> = Vec::new();
+    for page in pages(rows, &[]) {
+        let Some((_, record)) = folder(&page.scan, dirs).filter(|(_, r)| !r.settings.otsu) else {
+            continue;
+        };
+        let Some(lower) = record.results.lower.map(|lower| lower.to_string()) else {
+            continue;
+        };
+        match found.iter_mut().find(|(known, _)| *known == lower) {
+            Some((_, scans)) => scans.push(page.scan),
+            None => found.push((lower, vec![page.scan])),
+        }
+    }
+    let words: Vec<String> = found
+        .iter()
+        .map(|(lower, scans)| format!("{lower}: {}", scans.join(", ")))
+        .collect();
+    (found.len() > 1).then(|| {
+        format!(
+            "lower thresholds differ between scans ({}): a difference of moduli can be one of thresholds",
+            words.join("; ")
+        )
+    })
 }
 
 fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {

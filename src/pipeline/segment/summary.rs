@@ -117,7 +117,7 @@ pub(super) fn warnings(s: &SegmentSummary) -> Vec<String> {
             ));
         }
     }
-    if s.removed_voxels > s.bone_voxels / 10 {
+    if 10 * s.removed_voxels > s.removed_voxels + s.bone_voxels {
         found.push(format!(
             "{} voxels in {} smaller components were removed, {:.0} % of what was selected: check the threshold",
             s.removed_voxels,

@@ -139,7 +139,10 @@ pub fn methods(report: &Report, known: &Known) -> Methods {
             solution::text(&answered, &solved, &condition, known.target),
         ),
         ("Failure", solution::failure(&answered, known)),
-        ("Statistics", statistics::text(&report.groups, has_subjects)),
+        (
+            "Statistics",
+            statistics::text(&report.groups, &report.answers, has_subjects),
+        ),
     ];
     let sections: Vec<(String, String)> = parts
         .into_iter()

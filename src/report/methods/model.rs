@@ -16,10 +16,19 @@ pub fn text(report: &Report, answered: &[Answered]) -> String {
         let key = &a.row.key;
         (key.method, key.structure, key.boundary, key.elements)
     };
-    let kinds = distinct(answered.iter().map(kind));
+    // What joins nothing was not solved, unless nothing was.
+    let loaded: Vec<&Answered> = answered
+        .iter()
+        .filter(|a| !a.row.is_disconnected())
+        .collect();
+    let of_models: Vec<&Answered> = match loaded.is_empty() {
+        true => answered.iter().collect(),
+        false => loaded,
+    };
+    let kinds = distinct(of_models.iter().map(|a| kind(a)));
     let mut text = String::new();
     for k in &kinds {
-        let of: Vec<&Answered> = answered.iter().filter(|a| kind(a) == *k).collect();
+        let of: Vec<&&Answered> = of_models.iter().filter(|a| kind(a) == *k).collect();
         let rows: Vec<&Row> = of.iter().map(|a| a.row).collect();
         if kinds.len() > 1 {
             let names: Vec<&str> = of.iter().map(|a| a.line.scan.as_str()).collect();

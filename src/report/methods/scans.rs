@@ -33,14 +33,17 @@ fn studied(report: &Report, known: &Known) -> String {
         text += &format!(" of {}", counted(named.len(), "subject"));
     }
     if !groups.is_empty() {
-        let of = |group: &&str| {
-            lines
-                .iter()
-                .filter(|l| l.group.as_deref() == Some(group))
-                .count()
+        let size = |group: &&str| {
+            let own = || lines.iter().filter(|l| l.group.as_deref() == Some(group));
+            let subjects = distinct(own().filter_map(|l| l.subject.as_deref())).len();
+            let of = match subjects {
+                0 => String::new(),
+                n => format!(" of {}", counted(n, "subject")),
+            };
+            format!("{group} ({}{of})", counted(own().count(), "scan"))
         };
-        let sizes: Vec<String> = groups.iter().map(|g| format!("{g}: {}", of(g))).collect();
-        text += &format!(" in groups ({}; scans)", sizes.join(", "));
+        let sizes: Vec<String> = groups.iter().map(size).collect();
+        text += &format!(" in {}: {},", counted(groups.len(), "group"), list(&sizes));
     }
     let was = match lines.len() {
         1 => "was",
@@ -105,19 +108,33 @@ fn smoothed(s: &Segmented) -> Option<String> {
     })
 }
 
-/// One sentence for each kind of threshold and unit.
+/// Thresholds that are listed with their scans; of more there is a range for each kind.
+const MOST_THRESHOLDS: usize = 4;
+
+fn unit(s: &Segmented) -> String {
+    match s.unit.as_deref() {
+        None | Some("native") => "in the units of the image".to_owned(),
+        Some(unit) => unit.to_owned(),
+    }
+}
+
+/// How bone was found, scan by scan, or a sentence for each kind of threshold and unit.
 fn thresholds(all: &[Segmented]) -> String {
+    let own = |s: &Segmented| threshold(&[s], &unit(s));
+    if distinct(all.iter().map(own)).len() <= MOST_THRESHOLDS {
+        return by_scan(all, |s| &s.scan, |s| Some(own(s)));
+    }
+    thresholds_by_kind(all) + " The value of each scan stands in its `segment.json`."
+}
+
+fn thresholds_by_kind(all: &[Segmented]) -> String {
     let kind = |s: &Segmented| (discriminant(&s.threshold), s.unit.clone());
     let kinds = distinct(all.iter().map(kind));
     let alike = kinds.len() == 1;
     let sentence = |k: &(u8, Option<String>)| {
         let of: Vec<&Segmented> = all.iter().filter(|s| kind(s) == *k).collect();
         let names: Vec<&str> = of.iter().map(|s| s.scan.as_str()).collect();
-        let unit = match k.1.as_deref() {
-            None | Some("native") => "in the units of the image".to_owned(),
-            Some(unit) => unit.to_owned(),
-        };
-        let words = threshold(&of, &unit);
+        let words = threshold(&of, &unit(of[0]));
         match alike {
             true => format!(" {words}."),
             false => format!(" {words} (of {}).", scans(&names)),
@@ -204,12 +221,24 @@ fn connected(all: &[Segmented]) -> String {
         })
     };
     let mut text = by_scan(all, |s| &s.scan, |s| says(s));
-    let most = all.iter().map(|s| s.removed_share).fold(0.0, f64::max);
-    if most > 0.0 {
-        text += &format!(
-            " This removed at most {} of a scan's bone voxels.",
-            percent(most)
-        );
+    let most = all
+        .iter()
+        .max_by(|a, b| a.removed_share.total_cmp(&b.removed_share));
+    match most.filter(|s| s.removed_share > 0.0) {
+        Some(most) if all.len() > 1 => {
+            text += &format!(
+                " This removed at most {} of a scan's bone voxels ({}).",
+                percent(most.removed_share),
+                most.scan
+            );
+        }
+        Some(one) => {
+            text += &format!(
+                " This removed {} of the bone voxels.",
+                percent(one.removed_share)
+            );
+        }
+        None => {}
     }
     text
 }

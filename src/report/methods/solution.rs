@@ -71,8 +71,14 @@ fn errors(answered: &[Answered], target: Option<f64>) -> String {
     if let Some(target) = target {
         let met = answered.iter().filter(|a| a.line.met == Some(true)).count();
         let asked = answered.iter().filter(|a| a.line.met.is_some()).count();
+        let on = match (asked, met) {
+            (1, 1) => "it was met".to_owned(),
+            (1, _) => "it was not met".to_owned(),
+            _ if empty.is_empty() => format!("it was met on {met} of {asked}"),
+            _ => format!("it was met on {met} of the {asked} scans that carry load"),
+        };
         text += &format!(
-            " The target of the stated error was {} %; it was met on {met} of {asked}.",
+            " The target of the stated error was {} %; {on}.",
             setting(100.0 * target)
         );
     }

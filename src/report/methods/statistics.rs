@@ -1,10 +1,12 @@
 //! Owns what a methods section says of groups and tests.
 
+use super::words::{list, scans};
+use crate::report::answers::{Answers, comparable};
 use crate::report::distinct;
-use crate::report::groups::Groups;
+use crate::report::groups::{Groups, MODULUS};
 
 /// The tests that were made; empty where there is one scan only. `has_subjects`: a manifest names some.
-pub fn text(groups: &Groups, has_subjects: bool) -> String {
+pub fn text(groups: &Groups, answers: &Answers, has_subjects: bool) -> String {
     if groups.lines.iter().all(|line| line.found.n < 2) {
         return String::new();
     }
@@ -15,6 +17,7 @@ pub fn text(groups: &Groups, has_subjects: bool) -> String {
         false => "Values are mean ± standard deviation over scans; no subjects were named.",
     }
     .to_owned();
+    text += &left_out(groups, answers);
     if groups.comparisons.is_empty() {
         return text;
     }
@@ -33,4 +36,25 @@ pub fn text(groups: &Groups, has_subjects: bool) -> String {
         text += " Effect sizes are Hedges' g with 95 % confidence intervals.";
     }
     text
+}
+
+/// The scans that are in no group, and how many are left; empty where all are in.
+fn left_out(groups: &Groups, answers: &Answers) -> String {
+    let (kept, _) = comparable(answers);
+    let all = answers.lines.iter().map(|line| line.scan.as_str());
+    let out: Vec<&str> = all
+        .filter(|scan| kept.iter().all(|line| line.scan != *scan))
+        .collect();
+    if out.is_empty() {
+        return String::new();
+    }
+    let of_moduli = groups.lines.iter().filter(|line| line.quantity == MODULUS);
+    let left: Vec<String> = of_moduli
+        .map(|line| format!("{} in {}", line.found.n, line.group))
+        .collect();
+    format!(
+        " What carries no load or had other conditions ({}) is in no group or test, which leaves {}.",
+        scans(&out),
+        list(&left)
+    )
 }

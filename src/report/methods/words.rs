@@ -28,7 +28,8 @@ pub fn size(mm: f64) -> f64 {
 pub fn result(v: f64) -> String {
     let magnitude = match v == 0.0 {
         true => 0,
-        false => v.abs().log10().floor() as i32,
+        // Of the rounded value: 9.996 is 10.0.
+        false => (v.abs() * (1.0 + 5e-4)).log10().floor() as i32,
     };
     format!("{:.*}", (2 - magnitude).clamp(0, 9) as usize, v)
 }

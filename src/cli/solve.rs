@@ -12,6 +12,7 @@ use bonepd_ct::physics::plasticity::Plasticity;
 use bonepd_ct::pipeline::apparent::checks::needs_modulus;
 use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams};
+use bonepd_ct::result::row::Row;
 use clap::Args;
 use std::path::{Path, PathBuf};
 

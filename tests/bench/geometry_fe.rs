@@ -39,7 +39,10 @@ fn main() {
         None => timed("phantom", phantom),
     };
     let voxels = specimen.bone.as_slice().iter().filter(|b| **b != 0).count();
-    println!("{voxels} bone voxels, {} threads", rayon::current_num_threads());
+    println!(
+        "{voxels} bone voxels, {} threads",
+        rayon::current_num_threads()
+    );
     if sizes.is_empty() {
         solve(&specimen, None);
     }
@@ -63,9 +66,13 @@ fn timed<T>(name: &str, part: impl FnOnce() -> T) -> T {
 
 /// Processor time of this process in seconds, all threads.
 fn cpu_s() -> f64 {
-    // SAFETY: `clock` takes nothing and only reads.
-    let ticks = unsafe { libc::clock() };
-    ticks as f64 / 1e6
+    let mut at = libc::timespec {
+        tv_sec: 0,
+        tv_nsec: 0,
+    };
+    // SAFETY: the pointer is valid for writes of one `timespec`.
+    unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &mut at) };
+    at.tv_sec as f64 + 1e-9 * at.tv_nsec as f64
 }
 
 fn peak_mib() -> f64 {
@@ -131,7 +138,15 @@ fn solve(specimen: &Specimen, element_mm: Option<f64>) {
     };
     let goal = system.goal.as_ref();
     let info = timed("iterations", || {
-        minimise_or_fall_back(system.operator, &system.held, &multigrid, &mut u, &cg, goal, |_| ())
+        minimise_or_fall_back(
+            system.operator,
+            &system.held,
+            &multigrid,
+            &mut u,
+            &cg,
+            goal,
+            |_| (),
+        )
     });
     let mut force = vec![[0.0; 3]; u.len()];
     system.operator.apply(&u, &mut force);
@@ -184,7 +199,9 @@ fn of_mesh(specimen: &Specimen, size_mm: f64) {
     });
     timed("  angles", || quality(&mesh));
     timed("  Euler number of the mesh", || euler(&mesh));
-    timed("  Euler number of the mask", || morphometry::euler(&specimen.bone));
+    timed("  Euler number of the mask", || {
+        morphometry::euler(&specimen.bone)
+    });
     let between = Keep::Between {
         axis: 2,
         ends_mm: [0.0, ends[2]],

@@ -15,7 +15,7 @@ const BALANCED: f64 = 0.06;
 pub const STEPS: f64 = 32.0;
 
 /// Elements with a smaller share of bone are left out.
-pub const LEAST: f64 = 0.1;
+pub const LEAST: f32 = 0.1;
 
 /// Middles of edges in the order around the one between the middles of edges 2 and 4.
 const RING: [usize; 4] = [0, 1, 5, 3];
@@ -63,7 +63,10 @@ fn share(corners: [f64; 4], middles: [f64; 6]) -> f64 {
     for (c, corner) in corners.iter().enumerate() {
         let mut part = [*corner; 4];
         let own = (0..6).filter(|e| EDGES[*e].contains(&c));
-        part[1..].iter_mut().zip(own).for_each(|(p, e)| *p = middles[e]);
+        part[1..]
+            .iter_mut()
+            .zip(own)
+            .for_each(|(p, e)| *p = middles[e]);
         sum += positive(part);
     }
     for i in 0..4 {
@@ -105,9 +108,8 @@ mod tests {
         let places = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         for s in [0.1, 0.3, 0.5, 0.8] {
             let value = |p: [f64; 3]| p[0] - s;
-            let middles = EDGES.map(|[a, b]| {
-                value([0, 1, 2].map(|c| 0.5 * (places[a][c] + places[b][c])))
-            });
+            let middles =
+                EDGES.map(|[a, b]| value([0, 1, 2].map(|c| 0.5 * (places[a][c] + places[b][c]))));
             let found = share(places.map(value), middles);
             let exact = (1.0f64 - s).powi(3);
             assert!((found - exact).abs() < 5e-3, "{s}: {found} {exact}");
@@ -115,9 +117,8 @@ mod tests {
         // Beyond x + y = s: two corners on either side.
         for s in [0.2, 0.6] {
             let value = |p: [f64; 3]| p[0] + p[1] - s;
-            let middles = EDGES.map(|[a, b]| {
-                value([0, 1, 2].map(|c| 0.5 * (places[a][c] + places[b][c])))
-            });
+            let middles =
+                EDGES.map(|[a, b]| value([0, 1, 2].map(|c| 0.5 * (places[a][c] + places[b][c]))));
             // Sections at x + y = t have the area t (1 − t) of the whole's, times 6.
             let exact = 1.0 - (3.0 * s * s - 2.0 * s * s * s);
             let found = share(places.map(value), middles);

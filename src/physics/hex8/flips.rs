@@ -155,8 +155,8 @@ mod tests {
         })
     }
 
-    /// A column of bricks with no bricks beside it: without one of them the column carries nothing, and local motion frees as much as the nodes
-    /// next to it allow. In a row that reaches from end to end and is one brick high, a brick frees its own energy, `½ 1000 0.01²`.
+    /// All nodes of a plate one brick thick are held along the load. Without Poisson's effect nothing moves when a brick goes or comes: its own energy is
+    /// all that changes, `½ 1000 0.01²`.
     #[test]
     fn a_brick_between_plates_frees_and_stores_its_own_energy() {
         let own = 0.5 * 1000.0 * 1e-4;

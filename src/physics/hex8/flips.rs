@@ -2,7 +2,7 @@
 //!
 //! With displacements `u`, in equilibrium with stiffness `A` around the brick's eight nodes, and the brick's own stiffness `K`:
 //! a brick taken away frees `½ uᵀKu + ½ (Ku)ᵀ(A − K)⁻¹(Ku)`, one that is added stores `½ uᵀKu − ½ (Ku)ᵀ(A + K)⁻¹(Ku)`, where new nodes start at
-//! 0. At the limit of many small bricks along a smooth surface both are the energy density there times their volume.
+//! 0. Of single bricks in a flat face the first is more than the energy density there times their volume, the second less.
 
 use super::element::ElementMatrix;
 use crate::discretisation::voxels::VoxelMesh;

@@ -186,6 +186,7 @@ fn specimen(grey: Volume<f32>) -> Specimen {
             keep_all: false,
             // Values of distances need no sharpening.
             blur_voxels: Some(1.0),
+            is_blur_given: false,
         }),
         grey: Some(grey),
     }
@@ -382,6 +383,31 @@ fn the_error_falls_with_the_square_of_the_size() {
         "{coarse} {middle} {fine}"
     );
     assert!((middle / fine - 1.0).abs() < 0.005, "{middle} {fine}");
+}
+
+/// A hollow cylinder whose ends turn against each other: circular sections do not warp, so `G J / L` is exact. The surface meets the platens at
+/// right angles.
+#[test]
+fn the_energy_of_a_twisted_tube_is_of_second_order() {
+    let (outer, inner, n, length) = (10.3, 6.2, 24, 12);
+    let tube = specimen(grey([n, n, length], |p| {
+        let r = (p[0] - 12.1).hypot(p[1] - 11.8);
+        (outer - r).min(r - inner)
+    }));
+    let shear_mpa = 1000.0 / 2.6;
+    let polar = 0.5 * PI * (f64::powi(outer, 4) - f64::powi(inner, 4));
+    let exact = shear_mpa * polar / length as f64 * 1f64.to_radians();
+    let off = [4.0, 2.0, 1.0].map(|size| {
+        let twisted = SolveParams {
+            load: Load::Torsion,
+            ..params(size)
+        };
+        let solution = of_geometry().solve_specimen(&tube, &twisted, &mut |_, _| ());
+        let solved = solution.unwrap().modulus().unwrap().0;
+        (solved.work.moment_nmm.unwrap() / exact - 1.0).abs()
+    });
+    println!("{off:?}");
+    assert!(off[2] < off[0] / 16.0 && off[2] < 2e-3, "{off:?}");
 }
 
 /// The sensitivity from one solve is that of solves at thresholds around it, where the topology stays.

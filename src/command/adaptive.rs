@@ -186,7 +186,7 @@ impl Climb<'_> {
         Some(Learnt {
             surface: self
                 .scan
-                .surface(one?.solved.as_ref()?.threshold_sensitivity),
+                .surface(one?.solved.as_ref()?.surface_energy_ratio),
             again: change(again)?,
             refined: change(fine)?,
         })

@@ -119,12 +119,12 @@ impl OpenScan {
         self.image
     }
 
-    /// `S` of [`shape`] for one element a voxel whose modulus answers to the surface by `sensitivity`. A block of bone without
-    /// a surface leaves nothing open.
-    pub fn surface(&self, sensitivity: Option<f64>) -> f64 {
+    /// `S` of [`shape`] for elements whose energy density at the surface has this `ratio` to the mean. A block of bone without a surface leaves
+    /// nothing open.
+    pub fn surface(&self, ratio: Option<f64>) -> f64 {
         let voxel_mm = self.specimen.bone.grid.voxel_mm3().cbrt();
         self.plate_thickness_mm
-            .map_or(0.0, |t| shape::surface(sensitivity, t / voxel_mm))
+            .map_or(0.0, |t| shape::surface(ratio, t / voxel_mm))
     }
 
     /// The mask.
@@ -313,14 +313,14 @@ impl OpenScan {
 
     /// What one solve by finite elements states of its error against the body; `euler`: numbers of smooth elements and mask.
     fn state(&self, row: &mut Row, euler: Option<[i64; 2]>) {
-        let sensitivity = row.solved.as_ref().and_then(|s| s.threshold_sensitivity);
+        let ratio = row.solved.as_ref().and_then(|s| s.surface_energy_ratio);
         let voxel_mm = self.specimen.bone.grid.voxel_mm3().cbrt();
         let size = row.key.lp_mm / voxel_mm;
         if self.has_interfaces(row) {
             shape::state(row, None);
             notes::add(&mut row.marks.note, shape::INTERFACES);
         } else if let Some(elements) = row.key.elements {
-            let surface = self.surface(sensitivity);
+            let surface = self.surface(ratio);
             let stated = match euler {
                 Some(euler) => Some(shape::of_smooth(self.image, size, surface, euler)),
                 None => shape::of_one_solve(self.image, elements, size, surface),
@@ -459,6 +459,7 @@ fn mark(row: &mut Row, measured: Option<&Morphometry>) {
 fn with_recorded(mut row: Row, recorded: &Recorded) -> Row {
     if let Some(solved) = &mut row.solved {
         solved.threshold_sensitivity = recorded.surface.map(|s| s.sensitivity);
+        solved.surface_energy_ratio = recorded.surface.map(|s| s.ratio);
         solved.failure = recorded.failure.as_ref().map(|f| FailureLoad {
             factor: f.factor,
             load_n: f.failure_load_n,

@@ -17,6 +17,9 @@ pub struct SurfaceEnergy {
     /// Relative change of E_app per relative change of bone volume. About 1 for straight struts and plates along the load,
     /// 2 for bent rods, 3 for bent plates.
     pub sensitivity: f64,
+    /// Energy density at the surface over that of all bone. On a smooth surface it is the sensitivity; on a staircase, whose corners bear nothing, it is
+    /// smaller.
+    pub ratio: f64,
     /// Mean of the squared energy density over the square of its mean: 1 where all bone is strained alike.
     pub spread: f64,
 }
@@ -36,8 +39,10 @@ pub fn surface_energy(elements: impl Iterator<Item = Element>) -> Option<Surface
         faces += free;
         at_surface += free * w;
     }
+    let ratio = at_surface / faces / (sum / n);
     (sum > 0.0 && faces > 0.0).then(|| SurfaceEnergy {
-        sensitivity: at_surface / faces / (sum / n),
+        sensitivity: ratio,
+        ratio,
         spread: squares / n / (sum / n).powi(2),
     })
 }

@@ -141,7 +141,7 @@ const ANSWERS: [Column; 28] = [
     MAX_ERROR,
 ];
 
-const RESULTS: [Column; 64] = [
+const RESULTS: [Column; 65] = [
     SCAN,
     METHOD,
     STRUCTURE,
@@ -260,6 +260,11 @@ const RESULTS: [Column; 64] = [
         "threshold_sensitivity",
         "",
         "relative change of E_app per relative change of bone volume",
+    ),
+    column(
+        "surface_energy_ratio",
+        "",
+        "strain energy density at the surface of the elements over that of all bone: shape_error_mpa scales with it",
     ),
     ANGLE,
     STIFFNESS,

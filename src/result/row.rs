@@ -58,6 +58,8 @@ pub struct Solution {
     pub shape_error_mpa: Option<f64>,
     /// Relative change of E_app per relative change of bone volume, all of the surface moved by one length.
     pub threshold_sensitivity: Option<f64>,
+    /// Energy density at the surface over that of all bone: stated errors scale with it.
+    pub surface_energy_ratio: Option<f64>,
     /// Wall time of the solve; longer where scans share the cores (`run --jobs`).
     pub wall_s: Option<f64>,
     /// Largest resident memory of the process during the solve. None where several scans share the process.

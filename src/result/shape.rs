@@ -20,8 +20,8 @@ pub const AGAIN_VOXELS: f64 = 0.7;
 /// σ in voxels of an image's blur from which on its edges count as blurred. Sharper images are taken for means over voxels.
 pub const BLURRED_VOXELS: f64 = 0.35;
 
-/// Sensitivity of bodies for which no energy density is known: the mean of the truth set.
-const USUAL_SENSITIVITY: f64 = 4.0 / 3.0;
+/// Ratio of bodies for which no energy density is known: the mean of the truth set.
+const USUAL_RATIO: f64 = 4.0 / 3.0;
 
 /// σ in voxels of the blurred images of the truth set: 0.7 of the scanner, 0.5 of the smoothing.
 const TRUTH_SET_BLUR: f64 = 0.86;
@@ -61,9 +61,9 @@ pub struct Learnt {
     pub refined: f64,
 }
 
-/// `S`: three times the sensitivity over the mean thickness in voxels, `2 BV / BS`.
-pub fn surface(sensitivity: Option<f64>, thickness_voxels: f64) -> f64 {
-    3.0 * sensitivity.unwrap_or(USUAL_SENSITIVITY) / thickness_voxels
+/// `S`: three times the energy density at the surface over the mean, over the mean thickness in voxels, `2 BV / BS`.
+pub fn surface(ratio: Option<f64>, thickness_voxels: f64) -> f64 {
+    3.0 * ratio.unwrap_or(USUAL_RATIO) / thickness_voxels
 }
 
 /// The error of finer elements of interpolated grey values.

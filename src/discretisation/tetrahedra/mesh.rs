@@ -12,6 +12,8 @@ pub struct Mesh {
     /// Whether a vertex was put on the surface.
     pub on_surface: Vec<bool>,
     pub elements: Vec<Corners>,
+    /// The share of each element that is bone, above 0.
+    pub shares: Vec<f32>,
     /// Edge lengths of the box.
     pub size_mm: [f64; 3],
     /// Mean edge of the lattice's cells.
@@ -35,12 +37,13 @@ impl Mesh {
         });
     }
 
-    /// Volume of all elements.
+    /// Volume of the bone in all elements.
     pub fn volume_mm3(&self) -> f64 {
         crate::par::sum_chunks(self.elements.len(), |range| {
-            self.elements[range]
-                .iter()
-                .map(|e| volume(self.corners(e)))
+            let elements = self.elements[range.clone()].iter();
+            elements
+                .zip(&self.shares[range])
+                .map(|(e, share)| f64::from(*share) * volume(self.corners(e)))
                 .sum()
         })
     }
@@ -70,6 +73,11 @@ impl Mesh {
     pub fn retain(&mut self, keep: impl Fn(usize) -> bool) {
         let mut at = 0;
         self.elements.retain(|_| {
+            at += 1;
+            keep(at - 1)
+        });
+        at = 0;
+        self.shares.retain(|_| {
             at += 1;
             keep(at - 1)
         });

@@ -231,6 +231,14 @@ impl VoxelMesh {
         s.start as usize + skip as usize
     }
 
+    /// The node with these indices (0 to n along each axis), where elements have one there.
+    pub fn node(&self, at: [usize; 3]) -> Option<usize> {
+        let [x, y, z] = at.map(|v| v as i64);
+        let node = self.first_from([z, y, x]);
+        let is_there = node < self.len() - PADDING as usize && self.around[node] != 0;
+        (is_there && self.indices(node).map(|v| v as usize) == at).then_some(node)
+    }
+
     /// Node indices (0 to n along each axis) of a node.
     pub fn indices(&self, node: usize) -> [u32; 3] {
         let i = self.segments.partition_point(|s| s.nodes().end <= node);

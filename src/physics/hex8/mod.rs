@@ -5,6 +5,7 @@
 
 pub mod element;
 pub mod fields;
+pub mod flips;
 pub mod heterogeneous;
 mod kernel;
 mod modes;

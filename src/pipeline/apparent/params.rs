@@ -121,12 +121,7 @@ impl Default for SolveParams {
 impl SolveParams {
     /// Whether grey values of the scan are needed in addition to its mask.
     pub fn needs_grey(&self) -> bool {
-        self.material.is_some()
-            || self.smoothed_again
-            || self.method == Method::GeometryFe
-            || (self.refine > 1 && !self.refine_mask)
-            || (self.coarsen > 1 && self.coarsen_by == CoarsenBy::Threshold)
-            || self.needs_labels()
+        self.material.is_some() || self.method != Method::Lattice || self.needs_labels()
     }
 
     /// Whether labels of the scan are read where it has some.

@@ -67,6 +67,8 @@ pub(super) struct Columns {
     #[serde(default)]
     threshold_sensitivity: Option<f64>,
     #[serde(default)]
+    surface_energy_ratio: Option<f64>,
+    #[serde(default)]
     angle_deg: Option<f64>,
     #[serde(default)]
     stiffness_n_per_mm: Option<f64>,
@@ -155,6 +157,7 @@ impl From<Row> for Columns {
             shape_error_mpa: solved.shape_error_mpa,
             error_mpa,
             threshold_sensitivity: solved.threshold_sensitivity,
+            surface_energy_ratio: solved.surface_energy_ratio,
             angle_deg: key.angle_deg,
             stiffness_n_per_mm: solved.stiffness_n_per_mm,
             force_n: solved.force_n,
@@ -228,6 +231,7 @@ impl TryFrom<Columns> for Row {
             discretization_error_mpa: c.discretization_error_mpa,
             shape_error_mpa: c.shape_error_mpa,
             threshold_sensitivity: c.threshold_sensitivity,
+            surface_energy_ratio: c.surface_energy_ratio,
             wall_s: c.wall_s,
             peak_mib: c.peak_mib,
             mechanisms: c.mechanisms,

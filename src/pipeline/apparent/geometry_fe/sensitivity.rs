@@ -91,6 +91,7 @@ pub fn of(
     let mean = energy / volume;
     (mean > 0.0 && weights > 0.0).then(|| SurfaceEnergy {
         sensitivity: at_surface / mean,
+        ratio: at_surface / mean,
         spread: squares / volume / (mean * mean),
     })
 }

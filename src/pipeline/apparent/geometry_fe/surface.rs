@@ -18,7 +18,12 @@ pub fn of(specimen: &Specimen) -> Surface {
     };
     let values = match image(specimen) {
         // The voxel's own box is the only blur.
-        Image::Grey { blur_voxels } if blur_voxels < BLURRED_VOXELS => upsample::sharpened(grey),
+        Image::Grey { blur_voxels } if blur_voxels < BLURRED_VOXELS => {
+            upsample::sharpened(grey, upsample::OF_A_VOXEL)
+        }
+        Image::Grey { blur_voxels } if threshold.is_blur_given => {
+            upsample::sharpened(grey, upsample::of_blur(blur_voxels))
+        }
         _ => grey.clone(),
     };
     let mut bounds = Vec::new();

@@ -10,6 +10,7 @@ mod record;
 mod sections;
 mod spread;
 pub mod supports;
+mod threshold;
 mod tissue_spread;
 
 use crate::discretisation::voxels::Planes;

@@ -4,17 +4,22 @@ use crate::grid::Grid;
 use crate::mask::resample;
 use crate::measure::apparent::EndWork;
 use crate::measure::surface_energy::{Element, SurfaceEnergy, surface_energy};
+use crate::physics::hex8::element;
 use crate::physics::hex8::fields::{Brick, Deformed, Kind};
+use crate::physics::hex8::flips::Solved;
 use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::fields::{Equilibrated, Field, FieldVolume, Place, Recorded};
 use crate::pipeline::apparent::params::{Sed, SolveParams};
 use crate::pipeline::apparent::tissue::Tissue;
+use crate::pipeline::apparent::voxel_fe::bricks::Bricks;
 use crate::pipeline::apparent::voxel_fe::bricks::rule;
 use crate::pipeline::apparent::voxel_fe::principal::principal_fields;
 use crate::pipeline::apparent::voxel_fe::sections::{ALL, sections};
 use crate::pipeline::apparent::voxel_fe::spread::{onto, spread};
 use crate::pipeline::apparent::voxel_fe::tissue_spread::{density, effective_strain};
-use crate::pipeline::apparent::voxel_fe::{VoxelModel, failure, tissue_spread};
+use crate::pipeline::apparent::voxel_fe::{
+    VoxelModel, failure, supports, threshold, tissue_spread,
+};
 use crate::result::details::{Details, FailureAt};
 use crate::volume::{Specimen, Volume};
 
@@ -158,6 +163,8 @@ impl<'a> Recorder<'a> {
         let step = mesh.elements.div_ceil(SAMPLED);
         let energies = |b: &Brick| (b.element, b.mean_energy_density_mpa);
         let sampled = self.deformed().sample(step, energies);
+        let sum: f64 = sampled.iter().map(|(_, w)| f64::from(*w)).sum();
+        let mean_mpa = sum / sampled.len().max(1) as f64;
         let mut filled = vec![false; mesh.grid.len()];
         mesh.low_corner_elements()
             .flatten()
@@ -173,10 +180,33 @@ impl<'a> Recorder<'a> {
             };
             neighbours.into_iter().map(free).sum()
         };
-        surface_energy(sampled.into_iter().map(|(element, density)| Element {
+        let of_density = surface_energy(sampled.into_iter().map(|(element, density)| Element {
             energy_density_mpa: f64::from(density),
             free_faces: free_faces(element),
-        }))
+        }))?;
+        let of_flips = match self.model.bricks {
+            Bricks::Homogeneous(_) => self.flipped(mean_mpa),
+            Bricks::Heterogeneous(_) => None,
+        };
+        Some(SurfaceEnergy {
+            sensitivity: of_flips.unwrap_or(of_density.sensitivity),
+            ..of_density
+        })
+    }
+
+    /// How the modulus answers to voxels that change sides; of bricks that are alike.
+    fn flipped(&self, mean_mpa: f64) -> Option<f64> {
+        let (mesh, grips) = (self.model.bricks.mesh(), self.model.grips);
+        let (young_mpa, poisson, rule) = self.kinds[0];
+        let h = mesh.grid.spacing_mm;
+        let solved = Solved {
+            mesh,
+            stiffness: &element::stiffness(h, young_mpa, poisson, rule),
+            held: &supports::held(mesh, grips, &self.model.motion, self.params.load),
+            u: self.solved.u,
+        };
+        let mean = mean_mpa * h.iter().product::<f64>();
+        threshold::sensitivity(&solved, self.specimen, grips, mean)
     }
 
     fn fields(&self, scan: Option<&Volume<u8>>) -> Vec<FieldVolume> {

@@ -63,9 +63,13 @@ fn tissue(row: &Row) -> Option<String> {
 
 fn strain(row: &Row) -> Option<String> {
     let strain = row.key.strain;
+    let model = match row.key.plasticity {
+        None => "the model is linear, and forces and fields grow with it without limit",
+        Some(_) => "strains and turns are taken as small, which they are not",
+    };
     (strain.abs() > MOST_STRAIN).then(|| {
         format!(
-            "a strain of {strain} is {:.0} %: the model is linear, and forces and fields grow with it without limit (1 % is -0.01)",
+            "a strain of {strain} is {:.0} %: {model} (1 % is -0.01)",
             100.0 * strain.abs()
         )
     })
@@ -117,7 +121,14 @@ mod tests {
             (row(|r| r.key.grip_mm = 0.6), "24 % of the height"),
             (row(|r| r.key.young_mpa = 10.0), "it would be 10000 MPa"),
             (row(|r| r.key.young_mpa = 17e9), "it would be 17000 MPa"),
-            (row(|r| r.key.strain = -0.5), "50 %"),
+            (row(|r| r.key.strain = -0.5), "50 %: the model is linear"),
+            (
+                row(|r| {
+                    r.key.strain = -0.5;
+                    r.key.plasticity = Some("von-mises:68".into());
+                }),
+                "taken as small",
+            ),
             (row(|r| r.key.lp_mm = 0.15), "far from converged"),
         ] {
             let found = cautions(&row, 5.0);

@@ -86,27 +86,78 @@ impl Strength {
 /// Strain by which the line of the elastic modulus is shifted.
 pub const OFFSET: f64 = 0.002;
 
+/// The step of a curve that the offset line crosses, strain and stress of its start and end, and the slope of the step before: of the
+/// first step the modulus.
+struct Crossing {
+    start: [f64; 2],
+    end: [f64; 2],
+    slope_before: f64,
+    /// Where the chord between both meets the offset line.
+    at: [f64; 2],
+}
+
+fn crossing(curve: &[CurvePoint], modulus_mpa: f64) -> Option<Crossing> {
+    let excess = |p: [f64; 2]| p[1] - modulus_mpa * (p[0] - OFFSET);
+    let mut start = [0.0, 0.0];
+    let mut slope_before = modulus_mpa;
+    for p in curve {
+        let end = [p.strain.abs(), p.stress_mpa.abs()];
+        let (above, below) = (excess(start), excess(end));
+        if above > 0.0 && below <= 0.0 {
+            let share = above / (above - below);
+            return Some(Crossing {
+                at: [0, 1].map(|i| start[i] + share * (end[i] - start[i])),
+                start,
+                end,
+                slope_before,
+            });
+        }
+        slope_before = (end[1] - start[1]) / (end[0] - start[0]);
+        start = end;
+    }
+    None
+}
+
 /// Yield is where the curve meets the line of slope `modulus_mpa` from [`OFFSET`] on.
 pub fn strength(curve: &[CurvePoint], modulus_mpa: f64) -> Strength {
-    let excess = |p: &[f64; 2]| p[1] - modulus_mpa * (p[0] - OFFSET);
-    let origin = [0.0, 0.0];
-    let points: Vec<[f64; 2]> = [origin]
-        .into_iter()
-        .chain(curve.iter().map(|p| [p.strain.abs(), p.stress_mpa.abs()]))
-        .collect();
-    let crossing = points
-        .windows(2)
-        .find(|w| excess(&w[0]) > 0.0 && excess(&w[1]) <= 0.0);
-    let at = crossing.map(|w| {
-        let share = excess(&w[0]) / (excess(&w[0]) - excess(&w[1]));
-        [0, 1].map(|i| w[0][i] + share * (w[1][i] - w[0][i]))
-    });
+    let at = crossing(curve, modulus_mpa).map(|c| c.at);
     Strength {
         yield_strain: at.map(|p| p[0]),
         yield_stress_mpa: at.map(|p| p[1]),
-        max_stress_mpa: points[1..].iter().map(|p| p[1]).reduce(f64::max),
+        max_stress_mpa: curve.iter().map(|p| p.stress_mpa.abs()).reduce(f64::max),
         ..Strength::default()
     }
+}
+
+/// Part of the yield stress that the length of load steps may leave open before it is worth a word.
+const LEFT_OPEN: f64 = 0.05;
+
+/// What a reader must know of a yield stress whose load step is long. A curve that bends down lies above the chord of the step, below the
+/// line on which the step before would have gone on and, where it rises, below its end.
+pub fn long_steps_in_words(curve: &[CurvePoint], modulus_mpa: f64) -> Option<String> {
+    let Crossing {
+        start: [strain, stress],
+        end,
+        slope_before,
+        at: [_, least],
+    } = crossing(curve, modulus_mpa)?;
+    // Where the line from the start with the slope before meets the offset line; nowhere where that is as steep.
+    let bent = modulus_mpa - slope_before;
+    let met = match bent > 0.0 {
+        true => stress + slope_before * (stress - modulus_mpa * (strain - OFFSET)) / bent,
+        false => f64::INFINITY,
+    };
+    let most = match end[1] >= stress {
+        true => met.min(end[1]),
+        false => met,
+    };
+    (most > (1.0 + LEFT_OPEN) * least).then(|| {
+        let upper = match most.is_finite() {
+            true => format!("between {least:.4} and {most:.4} MPa"),
+            false => format!("at {least:.4} MPa or above"),
+        };
+        format!("load steps are long where the curve meets the offset line: the yield stress lies {upper} (more --steps)")
+    })
 }
 
 #[cfg(test)]
@@ -135,5 +186,23 @@ mod tests {
         assert_eq!(strength(&peak, 1000.0).max_stress_mpa, Some(6.0));
         assert_eq!(strength(&perfect[..2], 1000.0).yield_stress_mpa, None);
         assert_eq!(strength(&[], 1000.0), Strength::default());
+    }
+
+    #[test]
+    fn steps_too_long_for_the_offset_are_said() {
+        // Perfect plasticity: modulus 1000, yield 5 MPa.
+        let perfect = |ends: &[f64]| -> Vec<[f64; 2]> {
+            ends.iter().map(|e| [*e, (1000.0 * e).min(5.0)]).collect()
+        };
+        let words = |ends: &[f64]| long_steps_in_words(&curve(&perfect(ends)), 1000.0);
+        // The chord of one step to 10 % meets the offset line at 0.105 MPa.
+        let long = words(&[0.1]).unwrap();
+        assert!(long.contains("between 0.1053 and 5.0000 MPa"), "{long}");
+        assert_eq!(words(&[0.004, 0.006, 0.01]), None);
+        assert_eq!(words(&[0.004]), None);
+        // One that falls after a step as steep as the modulus has no upper bound.
+        let falls = curve(&[[0.004, 4.0], [0.02, 3.0]]);
+        let falls = long_steps_in_words(&falls, 1000.0).unwrap();
+        assert!(falls.contains("or above"), "{falls}");
     }
 }

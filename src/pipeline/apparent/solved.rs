@@ -6,7 +6,7 @@ use crate::pipeline::apparent::params::{Ends, Load, Method, SolveParams};
 use crate::result::notes;
 use crate::result::row::{Marks, Row, Solution};
 use crate::result::settings::{Motion, Settings, Supports};
-use crate::result::strength::{Strength, Yielding, strength};
+use crate::result::strength::{Strength, Yielding, long_steps_in_words, strength};
 use crate::solver::cg::Ended;
 use crate::volume::Specimen;
 
@@ -212,8 +212,11 @@ impl Solved {
     /// The same with what was said of load steps.
     fn all_notes(&self, key: &Settings) -> Option<String> {
         let mut note = self.note(key);
-        for words in self.yielding.iter().flat_map(|y| &y.said) {
-            notes::add(&mut note, words);
+        if let Some(yielding) = &self.yielding {
+            let steps = long_steps_in_words(&yielding.curve, self.slope(key));
+            for words in yielding.said.iter().chain(&steps) {
+                notes::add(&mut note, words);
+            }
         }
         note
     }

@@ -97,8 +97,6 @@ pub struct Threshold {
     pub keep_all: bool,
     /// σ in voxels of all blur between the body and `grey` that is known: the scanner's and the smoothing.
     pub blur_voxels: Option<f64>,
-    /// Whether a person gave that blur: geometry-based FE then takes it off.
-    pub is_blur_given: bool,
 }
 
 impl Specimen {

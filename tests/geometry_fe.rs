@@ -186,7 +186,6 @@ fn specimen(grey: Volume<f32>) -> Specimen {
             keep_all: false,
             // Values of distances need no sharpening.
             blur_voxels: Some(1.0),
-            is_blur_given: false,
         }),
         grey: Some(grey),
     }

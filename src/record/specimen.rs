@@ -152,7 +152,6 @@ pub fn add_grey(dir: &Path, specimen: &mut Specimen) -> Result<()> {
         inside,
         keep_all: record.settings.keep_all,
         blur_voxels: record.results.blur_voxels,
-        is_blur_given: record.settings.blur_voxels.is_some(),
     });
     Ok(())
 }

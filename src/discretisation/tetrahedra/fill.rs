@@ -1,9 +1,8 @@
-//! Owns the making of a mesh: lattice, surface, stencils, fit, shares of bone.
+//! Owns the making of a mesh: lattice, surface, stencils, fit.
 
 use super::fit;
 use super::lattice::Lattice;
 use super::mesh::{Corners, Mesh};
-use super::shares::{LEAST, shares};
 use super::snap::{Side, Snapped};
 use super::stencils::{self, Vertex};
 use super::surface::Surface;
@@ -55,9 +54,6 @@ pub fn fill(surface: &Surface, lattice: &Lattice) -> Result<Mesh> {
     let mut mesh = numbered(layers.concat(), &snapped);
     mesh.orient();
     fit::fit(&mut mesh, surface);
-    let shares = shares(&mesh, surface);
-    mesh.shares.clone_from(&shares);
-    mesh.retain(|e| shares[e] >= LEAST);
     Ok(mesh)
 }
 
@@ -86,7 +82,6 @@ fn numbered(mut elements: Vec<Corners>, snapped: &Snapped) -> Mesh {
     Mesh {
         vertices_mm: used.par_iter().map(place).collect(),
         on_surface: used.par_iter().map(on).collect(),
-        shares: Vec::new(),
         elements,
         size_mm: snapped.lattice.ends_mm(),
         cell_mm: snapped.lattice.size_mm(),

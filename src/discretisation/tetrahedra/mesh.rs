@@ -12,8 +12,6 @@ pub struct Mesh {
     /// Whether a vertex was put on the surface.
     pub on_surface: Vec<bool>,
     pub elements: Vec<Corners>,
-    /// The share of each element that is bone, above 0.
-    pub shares: Vec<f32>,
     /// Edge lengths of the box.
     pub size_mm: [f64; 3],
     /// Mean edge of the lattice's cells.
@@ -37,13 +35,12 @@ impl Mesh {
         });
     }
 
-    /// Volume of the bone in all elements.
+    /// Volume of all elements.
     pub fn volume_mm3(&self) -> f64 {
         crate::par::sum_chunks(self.elements.len(), |range| {
-            let elements = self.elements[range.clone()].iter();
-            elements
-                .zip(&self.shares[range])
-                .map(|(e, share)| f64::from(*share) * volume(self.corners(e)))
+            self.elements[range]
+                .iter()
+                .map(|e| volume(self.corners(e)))
                 .sum()
         })
     }
@@ -73,11 +70,6 @@ impl Mesh {
     pub fn retain(&mut self, keep: impl Fn(usize) -> bool) {
         let mut at = 0;
         self.elements.retain(|_| {
-            at += 1;
-            keep(at - 1)
-        });
-        at = 0;
-        self.shares.retain(|_| {
             at += 1;
             keep(at - 1)
         });

@@ -10,7 +10,6 @@ pub mod mesh;
 pub mod nodes;
 pub mod pieces;
 pub mod quality;
-pub mod shares;
 pub mod snap;
 pub mod stencils;
 pub mod surface;

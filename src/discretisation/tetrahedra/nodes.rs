@@ -15,8 +15,6 @@ pub struct TetMesh {
     pub nodes_mm: Vec<[f64; 3]>,
     /// In the order of their least node.
     pub elements: Vec<Ten>,
-    /// The share of each element that is bone, above 0.
-    pub shares: Vec<f32>,
     /// Of each node, whether it is a corner of elements.
     pub is_corner: Vec<bool>,
     pub size_mm: [f64; 3],
@@ -72,17 +70,11 @@ impl TetMesh {
         elements
             .par_iter_mut()
             .for_each(|e| *e = e.map(|v| name[v as usize]));
-        let mut elements: Vec<(Ten, f32)> = elements
-            .into_iter()
-            .zip(mesh.shares.iter().copied())
-            .collect();
-        elements.par_sort_unstable_by_key(|(e, _)| (e.iter().min().copied(), *e));
-        let (elements, shares) = elements.into_iter().unzip();
+        elements.par_sort_unstable_by_key(|e| (e.iter().min().copied(), *e));
         TetMesh {
             nodes_mm: order.par_iter().map(|v| at_mm[*v as usize]).collect(),
             is_corner: order.par_iter().map(|v| (*v as usize) < corners).collect(),
             elements,
-            shares,
             size_mm: mesh.size_mm,
             cell_mm: mesh.cell_mm,
             edges,

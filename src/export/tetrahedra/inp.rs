@@ -12,7 +12,7 @@ use std::path::Path;
 /// With free ends two nodes of the lower grip are pinned sideways, which stops the rigid motions that are left and bears nothing.
 pub fn write(path: &Path, model: &GeometryModel, params: &SolveParams, bins: usize) -> Result<f64> {
     let elements = model.elements();
-    let young = |e: usize| model.young_mpa() * elements.weight(e);
+    let young = |e: usize| model.young_mpa() * elements.factor(e);
     let young: Vec<f64> = (0..elements.mesh.elements.len()).map(young).collect();
     let bins = Bins::of(&young, bins.max(1));
     atomic::write_with(path, |out| fill(out, model, params, &bins))?;

@@ -11,13 +11,13 @@ use std::path::Path;
 /// VTK's number of a quadratic tetrahedron, whose nodes come in the order of ours.
 const QUADRATIC_TETRA: u8 = 24;
 
-/// Elements with their moduli over the mean, times the share of each that is bone.
+/// Elements with their moduli over the mean.
 ///
 /// # Errors
 /// An unwritable file.
 pub fn write(path: &Path, model: &Tet10) -> Result<()> {
     let mesh = &model.mesh;
-    let factors = (0..mesh.elements.len()).map(|e| model.weight(e) as f32);
+    let factors = (0..mesh.elements.len()).map(|e| model.factor(e) as f32);
     let moduli = MeshArray::new("modulus_factor", 1, factors.collect());
     atomic::write_with(path, |out| {
         fill(out, &mesh.nodes_mm, &mesh.elements, &[], &[moduli])

@@ -103,17 +103,12 @@ impl Tet10 {
         [self.lambda, self.mu].map(|m| m * self.factor(e))
     }
 
-    /// Volume of the bone in an element, in mm³.
+    /// Volume of an element in mm³.
     pub fn volume_mm3(&self, e: usize) -> f64 {
         shape(&self.mesh, None, e).volume
     }
 
-    /// What an element's stiffness is over that of bone of the mean modulus that fills it.
-    pub fn weight(&self, e: usize) -> f64 {
-        self.factor(e) * f64::from(self.mesh.shares[e])
-    }
-
-    /// Of an element, with its factor and its share of bone in the volume.
+    /// Of an element, with its factor in the volume.
     pub fn shape(&self, e: usize) -> Shape {
         shape(&self.mesh, self.factor.as_deref(), e)
     }
@@ -127,7 +122,7 @@ impl Tet10 {
 fn shape(mesh: &TetMesh, factor: Option<&[f32]>, e: usize) -> Shape {
     let ten = &mesh.elements[e];
     let mut shape = Shape::of(std::array::from_fn(|c| mesh.nodes_mm[ten[c] as usize]));
-    shape.volume *= f64::from(mesh.shares[e]) * factor.map_or(1.0, |f| f64::from(f[e]));
+    shape.volume *= factor.map_or(1.0, |f| f64::from(f[e]));
     shape
 }
 

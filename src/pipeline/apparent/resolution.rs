@@ -32,11 +32,9 @@ pub fn resolved(specimen: &Specimen, params: &SolveParams) -> Result<Option<Spec
     } else if params.refine > 1 && !params.refine_mask {
         match (&specimen.grey, &specimen.threshold) {
             (Some(grey), Some(threshold)) => match image(specimen) {
-                Image::Grey { blur_voxels } if blur_voxels < BLURRED_VOXELS => interpolated(
-                    &upsample::sharpened(grey, upsample::OF_A_VOXEL),
-                    threshold,
-                    params.refine,
-                ),
+                Image::Grey { blur_voxels } if blur_voxels < BLURRED_VOXELS => {
+                    interpolated(&upsample::sharpened(grey), threshold, params.refine)
+                }
                 _ => interpolated(grey, threshold, params.refine),
             },
             _ => return Ok(None),

@@ -102,7 +102,6 @@ pub fn segment_measured<'a>(
     if let (Some(grey), Some(threshold)) = (&specimen.grey, &mut specimen.threshold) {
         let measured = || edge_blur_voxels(grey, &specimen.bone);
         threshold.blur_voxels = params.all_blur_voxels().or_else(measured);
-        threshold.is_blur_given = params.blur_voxels.is_some();
     }
     let mut summary = SegmentSummary {
         voxels: grid.n,
@@ -215,7 +214,6 @@ fn threshold_of(
         inside: inside.mask(grid),
         keep_all: params.keep_all,
         blur_voxels: None,
-        is_blur_given: false,
     })
 }
 

@@ -18,12 +18,7 @@ pub fn of(specimen: &Specimen) -> Surface {
     };
     let values = match image(specimen) {
         // The voxel's own box is the only blur.
-        Image::Grey { blur_voxels } if blur_voxels < BLURRED_VOXELS => {
-            upsample::sharpened(grey, upsample::OF_A_VOXEL)
-        }
-        Image::Grey { blur_voxels } if threshold.is_blur_given => {
-            upsample::sharpened(grey, upsample::of_blur(blur_voxels))
-        }
+        Image::Grey { blur_voxels } if blur_voxels < BLURRED_VOXELS => upsample::sharpened(grey),
         _ => grey.clone(),
     };
     let mut bounds = Vec::new();

@@ -180,10 +180,11 @@ fn needed(job: &Job, prepared: Prepared, params: &SolveParams) -> Result<Cost> {
     }
 }
 
-/// Bytes of a specimen: its mask and, where moduli follow grey values, those and each voxel's modulus.
+/// Bytes of a specimen: its mask, its grey values where the solve needs them, and each voxel's modulus where it follows a law.
 fn kept_bytes(specimen: &Specimen, params: &SolveParams) -> f64 {
-    let by_voxel = if params.material.is_some() { 9.0 } else { 1.0 };
-    specimen.bone.grid.len() as f64 * by_voxel
+    let grey = if params.needs_grey() { 4.0 } else { 0.0 };
+    let moduli = if params.material.is_some() { 4.0 } else { 0.0 };
+    specimen.bone.grid.len() as f64 * (1.0 + grey + moduli)
 }
 
 /// Refuses a lattice, to be built but not solved, that this machine has no memory for.

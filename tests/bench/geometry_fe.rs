@@ -3,14 +3,14 @@
 //! `cargo bench --bench geometry_fe`: the stack in the folder that `BONEPD_STACK` names, else a phantom; numbers are sizes of elements in mm
 //! (`-- 0.06 0.044`; none: the default size). `RAYON_NUM_THREADS` sets the threads.
 
-use bonepd_ct::command::segment::in_memory;
+mod specimens;
+
 use bonepd_ct::discretisation::tetrahedra::fill::fill;
 use bonepd_ct::discretisation::tetrahedra::lattice::{Lattice, planes};
 use bonepd_ct::discretisation::tetrahedra::nodes::TetMesh;
 use bonepd_ct::discretisation::tetrahedra::pieces::{Keep, keep};
 use bonepd_ct::discretisation::tetrahedra::quality::{euler, quality};
 use bonepd_ct::discretisation::tetrahedra::surface::{Bound, Surface};
-use bonepd_ct::machine::session::Session;
 use bonepd_ct::measure::apparent::EndWork;
 use bonepd_ct::measure::morphometry;
 use bonepd_ct::operator::Operator;
@@ -21,11 +21,10 @@ use bonepd_ct::pipeline::apparent::fields::Equilibrated;
 use bonepd_ct::pipeline::apparent::geometry_fe::GeometryModel;
 use bonepd_ct::pipeline::apparent::tissue::Tissue;
 use bonepd_ct::pipeline::apparent::{Method, SolveParams};
-use bonepd_ct::pipeline::phantom::{PhantomParams, scan, structure};
-use bonepd_ct::pipeline::segment::{SegmentParams, segment};
+use bonepd_ct::pipeline::phantom::PhantomParams;
 use bonepd_ct::solver::cg::CgParams;
 use bonepd_ct::solver::cg::fallback::minimise_or_fall_back;
-use bonepd_ct::volume::{Specimen, Volume};
+use bonepd_ct::volume::Specimen;
 use std::path::Path;
 use std::time::Instant;
 
@@ -35,7 +34,7 @@ fn main() {
         .filter_map(|word| word.parse().ok())
         .collect();
     let specimen = match std::env::var_os("BONEPD_STACK") {
-        Some(stack) => timed("read and segment", || real(Path::new(&stack))),
+        Some(stack) => timed("read and segment", || specimens::real(Path::new(&stack))),
         None => timed("phantom", phantom),
     };
     let voxels = specimen.bone.as_slice().iter().filter(|b| **b != 0).count();
@@ -83,34 +82,14 @@ fn peak_mib() -> f64 {
 }
 
 fn phantom() -> Specimen {
-    let params = PhantomParams {
+    specimens::phantom(&PhantomParams {
         size_mm: [2.0; 3],
         spacing_mm: 0.02,
         bvtv: 0.25,
         thickness_mm: 0.16,
         seed: 1,
         ..PhantomParams::default()
-    };
-    let grey = scan(&mut structure(&params).expect("a phantom"), &params);
-    let values = grey.as_slice().iter().map(|&v| f32::from(v)).collect();
-    let window = SegmentParams {
-        lower: Some(200.0),
-        ..SegmentParams::default()
-    };
-    let grey = Volume::from_vec(grey.grid, values);
-    segment("phantom", &grey, &window, None)
-        .expect("bone")
-        .specimen
-}
-
-fn real(stack: &Path) -> Specimen {
-    let window = SegmentParams {
-        spacing_mm: Some([0.0195; 3]),
-        gaussian_voxels: 1.0,
-        lower: Some(63.0),
-        ..SegmentParams::default()
-    };
-    in_memory(stack, None, &window, &Session::default()).expect("a stack of slices")
+    })
 }
 
 /// One solve, part by part; then the parts of its mesh once more, by themselves.

@@ -4,9 +4,9 @@
 
 #![allow(missing_docs, reason = "a bench is no interface")]
 
-use bonepd_ct::command::segment::in_memory;
+mod specimens;
+
 use bonepd_ct::discretisation::voxels::Planes;
-use bonepd_ct::machine::session::Session;
 use bonepd_ct::operator::held::Constrained;
 use bonepd_ct::pipeline::apparent::discretisation::Prepared;
 use bonepd_ct::pipeline::apparent::ends::motion::EndMotion;
@@ -15,12 +15,11 @@ use bonepd_ct::pipeline::apparent::tissue::Tissue;
 use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use bonepd_ct::pipeline::apparent::voxel_fe::supports;
 use bonepd_ct::pipeline::apparent::{Ends, SolveParams};
-use bonepd_ct::pipeline::phantom::{PhantomParams, scan, structure};
-use bonepd_ct::pipeline::segment::{SegmentParams, segment};
+use bonepd_ct::pipeline::phantom::PhantomParams;
 use bonepd_ct::solver::cg;
 use bonepd_ct::solver::cg::jacobi::Jacobi;
 use bonepd_ct::solver::cg::{CgParams, ENERGY_ALONE};
-use bonepd_ct::volume::{Specimen, Volume};
+use bonepd_ct::volume::Specimen;
 use std::path::Path;
 
 const TARGET: f64 = 1e-3;
@@ -39,7 +38,7 @@ fn main() {
     }
     if wanted("stack") {
         match std::env::var_os("BONEPD_STACK") {
-            Some(stack) => report("stack", &real(Path::new(&stack)), Ends::Free),
+            Some(stack) => report("stack", &specimens::real(Path::new(&stack)), Ends::Free),
             None => println!("stack: skipped: BONEPD_STACK does not name the folder of its slices"),
         }
     }
@@ -47,34 +46,14 @@ fn main() {
 
 /// Struts of two voxels at BV/TV 12 %, about a million unknowns.
 fn thin(seed: u64) -> Specimen {
-    let params = PhantomParams {
+    specimens::phantom(&PhantomParams {
         size_mm: [2.3; 3],
         spacing_mm: 0.02,
         bvtv: 0.12,
         thickness_mm: 0.04,
         seed,
         ..PhantomParams::default()
-    };
-    let grey = scan(&mut structure(&params).expect("a phantom"), &params);
-    let values = grey.as_slice().iter().map(|&v| f32::from(v)).collect();
-    let grey = Volume::from_vec(grey.grid, values);
-    let window = SegmentParams {
-        lower: Some(200.0),
-        ..SegmentParams::default()
-    };
-    segment("thin", &grey, &window, None)
-        .expect("bone")
-        .specimen
-}
-
-fn real(stack: &Path) -> Specimen {
-    let window = SegmentParams {
-        spacing_mm: Some([0.0195; 3]),
-        gaussian_voxels: 1.0,
-        lower: Some(63.0),
-        ..SegmentParams::default()
-    };
-    in_memory(stack, None, &window, &Session::default()).expect("a stack of slices")
+    })
 }
 
 fn report(name: &str, specimen: &Specimen, ends: Ends) {

@@ -14,7 +14,8 @@ use crate::cohort::job::ScanJob;
 use crate::cohort::outcome::{ScanResult, State, in_words, outcome, result, said_of_kept};
 use crate::cohort::scans::Selection;
 use crate::command::estimate::{Estimate, estimate};
-use crate::command::{Outcome, adaptive, answer, lattice, report, segment, solve};
+use crate::command::solve::OpenScan;
+use crate::command::{Outcome, adaptive, answer, lattice, report, segment};
 use crate::error::{Error, Result};
 use crate::io::{atomic, own_files, table};
 use crate::machine::host;
@@ -23,7 +24,6 @@ use crate::recipe::Recipe;
 use crate::record::failures;
 use crate::record::failures::Failure;
 use crate::record::results;
-use crate::record::results::Results;
 use crate::result::row::Row;
 use indicatif::ProgressBar;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -299,18 +299,24 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
     if lattice::settings(dir).ok().as_ref() != Some(&recipe.lattice) || session.force {
         lattice::remember(dir, &recipe.lattice)?;
     }
+    // Loads differ, the tissue does not: the scan is opened once for all of them.
+    let opened_for = match recipe.error {
+        Some(_) => adaptive::widest(&recipe.solve),
+        None => recipe.solve.clone(),
+    };
+    let mut scan = OpenScan::open(dir, &opened_for, session.force, session)?;
     let mut rows = Vec::new();
     for params in recipe.solves() {
         rows.extend(match recipe.error {
-            Some(target) => adaptive::solve_to(dir, target, &params, session)?.rows,
-            None => solve::solve(dir, &recipe.lattice, &params, session)?,
+            Some(target) => adaptive::solve_open_to(&mut scan, target, &params, session)?.rows,
+            None => scan.solve(&recipe.lattice, &params, session)?,
         });
     }
     for row in &mut rows {
         row.marks.group.clone_from(&job.group);
         row.marks.subject.clone_from(&job.subject);
     }
-    Results::open(dir, false)?.label(&job.group, &job.subject)?;
+    scan.results().label(&job.group, &job.subject)?;
     answer::keep(dir, &rows, recipe.error)?;
     Ok(rows)
 }

@@ -230,8 +230,11 @@ fn values_out_of_unit(scan: &Scan, params: &SegmentParams) -> Option<String> {
 }
 
 /// The specimen that `segment` left in `dir`.
+///
+/// # Errors
+/// No segmented scan there, a damaged one.
 pub fn load(dir: &Path) -> Result<Specimen> {
-    specimen::load(dir)
+    Ok(specimen::load(dir)?.specimen)
 }
 
 fn up_to_date(

@@ -26,6 +26,7 @@ use crate::record::failures::Failure;
 use crate::record::results;
 use crate::result::row::Row;
 use indicatif::ProgressBar;
+use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -85,6 +86,7 @@ pub fn cohort(
         session,
         bar: session.bar(jobs.len() as u64, "all scans"),
         done: Mutex::new(vec![None; jobs.len()]),
+        tables: Mutex::default(),
     };
     run.bar
         .set_message(format!("0 of {} scans done", jobs.len()));
@@ -114,6 +116,8 @@ struct Run<'a> {
     bar: ProgressBar,
     /// By scan, in the order of the inputs.
     done: Mutex<Vec<Option<Result<Vec<Row>>>>>,
+    /// All rows in the folders of the scans that are done, by name.
+    tables: Mutex<HashMap<String, Vec<Row>>>,
 }
 
 impl Run<'_> {
@@ -174,11 +178,22 @@ impl Run<'_> {
     /// All rows so far, in the order of the scans: all that the folders of the scans hold, also of earlier runs.
     fn write_rows(&self, done: &[Option<Result<Vec<Row>>>]) -> Result<Vec<Row>> {
         let mut rows = Vec::new();
+        let mut tables = self.tables.lock().expect("tables are read without panic");
         for name in &self.names {
             let is_done = |i: usize| matches!(done[i], Some(Ok(_)));
             let file = self.out.join(name).join(own_files::RESULTS);
-            if self.job(name).is_none_or(is_done) && file.is_file() {
-                rows.extend(table::read::<Row>(&file)?);
+            if self.job(name).is_some_and(|i| !is_done(i)) || !file.is_file() {
+                continue;
+            }
+            if let Some(own) = tables.get(name) {
+                rows.extend_from_slice(own);
+                continue;
+            }
+            let read: Vec<Row> = table::read(&file)?;
+            rows.extend_from_slice(&read);
+            // Another process may be at work on a scan that is not of this run.
+            if self.job(name).is_some() {
+                tables.insert(name.clone(), read);
             }
         }
         match rows.is_empty() {

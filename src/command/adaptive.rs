@@ -7,7 +7,7 @@
 mod strength;
 
 use crate::command::answer;
-use crate::command::estimate;
+use crate::command::estimate::FreeMemory;
 use crate::command::in_words::{answer_in_words, in_words};
 use crate::command::ladder::{
     COARSENED, ONE_REFINEMENT, REFINED, smoothed_again, split_voxels, voxel_fe,
@@ -202,7 +202,7 @@ impl Climb<'_> {
     }
 
     fn fits(&self, params: &SolveParams) -> Result<()> {
-        estimate::refuse_what_does_not_fit(&of_voxels(), self.scan.prepared(), params)
+        of_voxels().fits(self.scan.prepared(), params, &FreeMemory::now())
     }
 
     fn is_done(&self) -> bool {

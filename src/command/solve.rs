@@ -266,7 +266,6 @@ impl OpenScan {
             ));
             return Ok(None);
         }
-        estimate::refuse_what_does_not_fit(job, prepared, params)?;
         self.solve_job(job, blank, params, session).map(Some)
     }
 
@@ -289,7 +288,8 @@ impl OpenScan {
         bar.set_message("building the model and its multigrid");
         let loads = if params.load == Load::Stiffness { 6 } else { 1 };
         let mut kept = KeptSteps::new(&self.dir, self.results.fingerprint(blank, params), session);
-        let solution = job.solve(prepared, params, &mut kept, &mut |load, step| {
+        let memory = &estimate::FreeMemory::now();
+        let solution = job.solve(prepared, params, memory, &mut kept, &mut |load, step| {
             show(&bar, [load, loads], step, params.tolerance);
         })?;
         bar.finish_and_clear();

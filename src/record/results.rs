@@ -372,10 +372,7 @@ mod tests {
         assert_eq!(table.len(), 3);
         assert_eq!(table[2].key.boundary, Some(BoundaryRule::Ffb));
 
-        assert_eq!(
-            opened(&dir, "mask", true).find(&blank(FIRM), &params),
-            None
-        );
+        assert_eq!(opened(&dir, "mask", true).find(&blank(FIRM), &params), None);
         assert_eq!(
             opened(&dir, "another", false).find(&blank(FIRM), &params),
             None

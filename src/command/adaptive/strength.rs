@@ -3,7 +3,7 @@
 //!
 //! Load steps are compared on one element a voxel, where they are cheap. Elements are voxels, whole and split: one body.
 
-use crate::command::estimate;
+use crate::command::estimate::FreeMemory;
 use crate::command::ladder::split_voxels;
 use crate::command::solve::OpenScan;
 use crate::error::Result;
@@ -121,6 +121,6 @@ impl Climb<'_> {
 
     fn fits(&self, split: usize) -> Result<()> {
         let params = self.params(split, self.params.steps);
-        estimate::refuse_what_does_not_fit(&of_voxels(), self.scan.prepared(), &params)
+        of_voxels().fits(self.scan.prepared(), &params, &FreeMemory::now())
     }
 }

@@ -22,7 +22,7 @@ use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::{Load, SolveParams, jobs};
 use crate::pipeline::lattice::LatticeParams;
 use crate::record::details;
-use crate::record::results::Results;
+use crate::record::results::{self, Results};
 use crate::record::specimen::{self, SegmentedScan};
 use crate::result::cautions;
 use crate::result::derived::with_derived;
@@ -89,6 +89,7 @@ impl OpenScan {
         if !session.dry_run {
             atomic::sweep(dir);
         }
+        results::keep_other_version(dir, session);
         let scan = loaded(dir, params)?;
         let image = scan.image();
         let (specimen, measured) = (scan.specimen, scan.record.results);

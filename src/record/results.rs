@@ -54,6 +54,29 @@ pub fn set_aside_stale(dir: &Path, session: &Session) {
     }
 }
 
+/// Keeps the results in `dir` under another name where another version made them: its rows are not mixed with those of this one.
+pub fn keep_other_version(dir: &Path, session: &Session) {
+    let table = dir.join(RESULTS);
+    if session.dry_run || !table.is_file() {
+        return;
+    }
+    let version = Record::read(dir).map(|record| record.provenance.version);
+    if version.as_deref() == Some(env!("CARGO_PKG_VERSION")) {
+        return;
+    }
+    // Of a record that cannot be read, or of none, only this is known.
+    let version = version.unwrap_or_else(|| "other".to_owned());
+    let kept = format!("results-{version}.csv");
+    details::remove(dir);
+    if std::fs::rename(&table, dir.join(&kept)).is_ok() {
+        session.say(format!(
+            "{}: the results there are not of version {} of the program ({version}): they are kept as {kept}",
+            dir.display(),
+            env!("CARGO_PKG_VERSION"),
+        ));
+    }
+}
+
 /// Settings and details of the solves in `dir`; empty where there are none.
 pub fn details(dir: &Path) -> Vec<(Settings, Details)> {
     let rows = Record::read(dir).map_or(Vec::new(), |record| record.rows);

@@ -39,6 +39,7 @@ pub fn has_old(dir: &Path) -> bool {
 
 /// The same where the mask in `dir` is not that of the results.
 pub fn set_aside_stale(dir: &Path, session: &Session) {
+    keep_other_version(dir, session);
     if session.dry_run {
         return;
     }

@@ -110,6 +110,7 @@ struct Record {
     rows: Vec<KeyedRow>,
 }
 
+// `segment.json` and `stiffness.json` have only program and version in common with this: a struct for two lines would be longer than they are.
 /// Where results come from, enough to make them again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Provenance {

@@ -17,7 +17,7 @@ use continuum_molecular::Molecular;
 use frame::{Observer, Output, Summary};
 use remodelling::bond_based::BondBasedParams;
 use remodelling::continuum::ContinuumParams;
-use remodelling::{bond_based, continuum};
+use remodelling::{bond_based, continuum, time_loop};
 use serde::{Deserialize, Serialize};
 use setting::{GridParams, Inputs, Probe, Setting};
 use std::path::Path;
@@ -130,8 +130,14 @@ pub fn check(scene: &Scene, inputs: &Inputs) -> Result<Points> {
     let setting = &scene.setting;
     setting.output.check()?;
     match &scene.physics {
-        Physics::BondBased(params) => bond_based::check(setting, params, inputs)?,
-        Physics::Continuum(params) => continuum::check(setting, params, inputs)?,
+        Physics::BondBased(params) => {
+            bond_based::marcher(setting, params, inputs)?;
+            time_loop::check(setting)?;
+        }
+        Physics::Continuum(params) => {
+            continuum::marcher(setting, params, inputs)?;
+            time_loop::check(setting)?;
+        }
         Physics::ContinuumMolecular(model) => {
             continuum_molecular::check::check(setting, model, inputs)?;
         }
@@ -144,8 +150,14 @@ pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Resul
     let setting = &scene.setting;
     setting.output.check()?;
     match &scene.physics {
-        Physics::BondBased(params) => bond_based::run(setting, params, inputs, observer),
-        Physics::Continuum(params) => continuum::run(setting, params, inputs, observer),
+        Physics::BondBased(params) => {
+            let marcher = bond_based::marcher(setting, params, inputs)?;
+            time_loop::run(marcher, setting, inputs, observer)
+        }
+        Physics::Continuum(params) => {
+            let marcher = continuum::marcher(setting, params, inputs)?;
+            time_loop::run(marcher, setting, inputs, observer)
+        }
         Physics::ContinuumMolecular(model) => {
             continuum_molecular::run(setting, model, inputs, observer)
         }

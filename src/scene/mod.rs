@@ -125,31 +125,67 @@ impl Scene {
     }
 }
 
-/// Refuses what a run would refuse before its first step. The material points.
-pub fn check(scene: &Scene, inputs: &Inputs) -> Result<Points> {
-    let setting = &scene.setting;
-    setting.output.check()?;
-    match &scene.physics {
-        Physics::BondBased(params) => bond_based::check(setting, params, inputs)?,
-        Physics::Continuum(params) => continuum::check(setting, params, inputs)?,
-        Physics::ContinuumMolecular(model) => {
-            continuum_molecular::check::check(setting, model, inputs)?;
-        }
-    }
-    setting.points(inputs)
+/// A scene that has been checked, with what was set up for that: a run goes on with it.
+pub struct Checked<'a> {
+    scene: &'a Scene,
+    inputs: &'a Inputs,
+    model: Model<'a>,
 }
 
-/// Runs a scene, reporting states to `observer` as they are accepted.
-pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Result<Summary> {
+/// What a scene's physics sets up.
+enum Model<'a> {
+    BondBased(Box<bond_based::Peridynamic>),
+    Continuum(Box<continuum::Local>),
+    ContinuumMolecular(Box<continuum_molecular::check::Checked<'a>>),
+}
+
+/// # Errors
+/// What a run would refuse before its first step.
+pub fn check<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Result<Checked<'a>> {
     let setting = &scene.setting;
     setting.output.check()?;
-    match &scene.physics {
-        Physics::BondBased(params) => bond_based::run(setting, params, inputs, observer),
-        Physics::Continuum(params) => continuum::run(setting, params, inputs, observer),
+    let model = match &scene.physics {
+        Physics::BondBased(params) => {
+            Model::BondBased(Box::new(bond_based::check(setting, params, inputs)?))
+        }
+        Physics::Continuum(params) => {
+            Model::Continuum(Box::new(continuum::check(setting, params, inputs)?))
+        }
         Physics::ContinuumMolecular(model) => {
-            continuum_molecular::run(setting, model, inputs, observer)
+            let checked = continuum_molecular::check::check(setting, model, inputs)?;
+            Model::ContinuumMolecular(Box::new(checked))
+        }
+    };
+    Ok(Checked {
+        scene,
+        inputs,
+        model,
+    })
+}
+
+impl Checked<'_> {
+    /// The material points.
+    pub fn points(&self) -> Result<Points> {
+        self.scene.setting.points(self.inputs)
+    }
+
+    /// Runs the scene, reporting states to `observer` as they are accepted.
+    pub fn run(self, observer: &mut dyn Observer) -> Result<Summary> {
+        let setting = &self.scene.setting;
+        match self.model {
+            Model::BondBased(model) => {
+                let points = setting.points(self.inputs)?;
+                bond_based::run(*model, setting, &points, observer)
+            }
+            Model::Continuum(model) => continuum::run(*model, setting, observer),
+            Model::ContinuumMolecular(checked) => checked.run(observer),
         }
     }
+}
+
+/// Checks and runs a scene.
+pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Result<Summary> {
+    check(scene, inputs)?.run(observer)
 }
 
 /// The expected key closest to the unknown one that serde names in its message.

@@ -1,5 +1,6 @@
 //! Owns scenes of bond-based peridynamics, with or without growth.
 
+use crate::discretisation::plane::Points;
 use crate::error::{Error, Result};
 use crate::physics::bond_based::{
     BondBased, Material, Step, micromodulus_continuous, micromodulus_discrete,
@@ -46,31 +47,32 @@ pub enum Micromodulus {
     Finite(f64),
 }
 
-/// Refuses what [`run`] would refuse before its first step.
-pub fn check(scene: &Setting, params: &BondBasedParams, inputs: &Inputs) -> Result<()> {
-    Peridynamic::new(scene, params, inputs)?;
-    time_loop::check(scene.marching_time()?)
+/// The model that [`run`] starts from.
+///
+/// # Errors
+/// What a run would refuse before its first step.
+pub fn check(scene: &Setting, params: &BondBasedParams, inputs: &Inputs) -> Result<Peridynamic> {
+    let model = Peridynamic::new(scene, params, inputs)?;
+    time_loop::check(scene.marching_time()?)?;
+    Ok(model)
 }
 
-/// Runs the scene.
+/// Runs the scene, of these material points.
 pub fn run(
+    mut model: Peridynamic,
     scene: &Setting,
-    params: &BondBasedParams,
-    inputs: &Inputs,
+    points: &Points,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    let mut model = Peridynamic::new(scene, params, inputs)?;
     let time = scene.marching_time()?;
     let mut summary = model.summary();
-    observer.start(
-        &scene.points(inputs)?,
-        (time.end / time.step).round() as usize,
-    )?;
+    observer.start(points, (time.end / time.step).round() as usize)?;
     run_time_loop(&mut model, time, &scene.output, observer, &mut summary)?;
     Ok(summary)
 }
 
-struct Peridynamic {
+/// A body of bonds on its way through time.
+pub struct Peridynamic {
     body: Body,
     model: BondBased,
     solver: Equilibrium,

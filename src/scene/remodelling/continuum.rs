@@ -18,20 +18,18 @@ use crate::scene::setting::{Inputs, Setting};
 use crate::scene::state::State;
 use crate::solver::newton::NotConverged;
 
-/// Refuses what [`run`] would refuse before its first step.
-pub fn check(scene: &Setting, params: &ContinuumParams, inputs: &Inputs) -> Result<()> {
-    Local::new(scene, params, inputs)?;
-    time_loop::check(scene.marching_time()?)
+/// The model that [`run`] starts from.
+///
+/// # Errors
+/// What a run would refuse before its first step.
+pub fn check(scene: &Setting, params: &ContinuumParams, inputs: &Inputs) -> Result<Local> {
+    let model = Local::new(scene, params, inputs)?;
+    time_loop::check(scene.marching_time()?)?;
+    Ok(model)
 }
 
 /// Runs the scene.
-pub fn run(
-    scene: &Setting,
-    params: &ContinuumParams,
-    inputs: &Inputs,
-    observer: &mut dyn Observer,
-) -> Result<Summary> {
-    let mut model = Local::new(scene, params, inputs)?;
+pub fn run(mut model: Local, scene: &Setting, observer: &mut dyn Observer) -> Result<Summary> {
     let time = scene.marching_time()?;
     let mut summary = Summary {
         points: model.body.material,
@@ -43,7 +41,8 @@ pub fn run(
     Ok(summary)
 }
 
-struct Local {
+/// A body of elements on its way through time.
+pub struct Local {
     body: Body,
     model: Continuum,
     solver: Equilibrium,

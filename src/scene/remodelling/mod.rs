@@ -5,7 +5,7 @@ pub mod bond_based;
 pub mod continuum;
 pub mod density;
 mod loads;
-mod marcher;
+pub mod marcher;
 pub mod solver;
 mod step_size;
 pub mod time_loop;

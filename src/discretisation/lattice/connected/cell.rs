@@ -113,7 +113,7 @@ fn label(labels: &mut [u16], m: [usize; 3]) -> usize {
     let mut up = parts::apart(labels.len());
     for v in (0..labels.len()).filter(|&v| labels[v] != NO_PIECE) {
         for a in 0..3 {
-            if v / strides[a] % m[a] > 0 && labels[v - strides[a]] != NO_PIECE {
+            if !(v / strides[a]).is_multiple_of(m[a]) && labels[v - strides[a]] != NO_PIECE {
                 parts::join(&mut up, v as u32, (v - strides[a]) as u32);
             }
         }

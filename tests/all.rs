@@ -40,6 +40,7 @@ mod phantom;
 mod pipelines;
 mod plasticity;
 mod privacy;
+mod reads;
 mod remodelling;
 mod report;
 mod scan_headers;

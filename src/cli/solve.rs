@@ -284,8 +284,15 @@ fn export(
 
 /// The settings that options are laid over: those of the run that the folder belongs to, else the defaults.
 fn start(args: &SolveArgs, session: &Session) -> SolveParams {
-    let Some((path, params)) = run_settings::of_run(&args.dir) else {
-        return SolveParams::default();
+    let (path, params) = match run_settings::of_run(&args.dir) {
+        Ok(Some(of_run)) => of_run,
+        Ok(None) => return SolveParams::default(),
+        Err(e) => {
+            session.warn(format!(
+                "load, ends and tissue are not taken from the run that made this folder: {e}"
+            ));
+            return SolveParams::default();
+        }
     };
     session.say(format!(
         "note: load, ends and tissue are those of the run ({}), where no option here sets them: {}. Method and resolution are not the run's",

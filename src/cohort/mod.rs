@@ -14,7 +14,8 @@ use crate::cohort::job::ScanJob;
 use crate::cohort::outcome::{ScanResult, State, in_words, outcome, result, said_of_kept};
 use crate::cohort::scans::Selection;
 use crate::command::estimate::{Estimate, estimate};
-use crate::command::{Outcome, adaptive, answer, lattice, report, segment, solve};
+use crate::command::solve::OpenScan;
+use crate::command::{Outcome, adaptive, answer, lattice, report, segment};
 use crate::error::{Error, Result};
 use crate::io::{atomic, own_files, table};
 use crate::machine::host;
@@ -23,9 +24,9 @@ use crate::recipe::Recipe;
 use crate::record::failures;
 use crate::record::failures::Failure;
 use crate::record::results;
-use crate::record::results::Results;
 use crate::result::row::Row;
 use indicatif::ProgressBar;
+use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -85,6 +86,7 @@ pub fn cohort(
         session,
         bar: session.bar(jobs.len() as u64, "all scans"),
         done: Mutex::new(vec![None; jobs.len()]),
+        tables: Mutex::default(),
     };
     run.bar
         .set_message(format!("0 of {} scans done", jobs.len()));
@@ -114,6 +116,8 @@ struct Run<'a> {
     bar: ProgressBar,
     /// By scan, in the order of the inputs.
     done: Mutex<Vec<Option<Result<Vec<Row>>>>>,
+    /// All rows in the folders of the scans that are done, by name.
+    tables: Mutex<HashMap<String, Vec<Row>>>,
 }
 
 impl Run<'_> {
@@ -174,11 +178,22 @@ impl Run<'_> {
     /// All rows so far, in the order of the scans: all that the folders of the scans hold, also of earlier runs.
     fn write_rows(&self, done: &[Option<Result<Vec<Row>>>]) -> Result<Vec<Row>> {
         let mut rows = Vec::new();
+        let mut tables = self.tables.lock().expect("tables are read without panic");
         for name in &self.names {
             let is_done = |i: usize| matches!(done[i], Some(Ok(_)));
             let file = self.out.join(name).join(own_files::RESULTS);
-            if self.job(name).is_none_or(is_done) && file.is_file() {
-                rows.extend(table::read::<Row>(&file)?);
+            if self.job(name).is_some_and(|i| !is_done(i)) || !file.is_file() {
+                continue;
+            }
+            if let Some(own) = tables.get(name) {
+                rows.extend_from_slice(own);
+                continue;
+            }
+            let read: Vec<Row> = table::read(&file)?;
+            rows.extend_from_slice(&read);
+            // Another process may be at work on a scan that is not of this run.
+            if self.job(name).is_some() {
+                tables.insert(name.clone(), read);
             }
         }
         match rows.is_empty() {
@@ -299,18 +314,24 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
     if lattice::settings(dir).ok().as_ref() != Some(&recipe.lattice) || session.force {
         lattice::remember(dir, &recipe.lattice)?;
     }
+    // Loads differ, the tissue does not: the scan is opened once for all of them.
+    let opened_for = match recipe.error {
+        Some(_) => adaptive::widest(&recipe.solve),
+        None => recipe.solve.clone(),
+    };
+    let mut scan = OpenScan::open(dir, &opened_for, session.force, session)?;
     let mut rows = Vec::new();
     for params in recipe.solves() {
         rows.extend(match recipe.error {
-            Some(target) => adaptive::solve_to(dir, target, &params, session)?.rows,
-            None => solve::solve(dir, &recipe.lattice, &params, session)?,
+            Some(target) => adaptive::solve_open_to(&mut scan, target, &params, session)?.rows,
+            None => scan.solve(&recipe.lattice, &params, session)?,
         });
     }
     for row in &mut rows {
         row.marks.group.clone_from(&job.group);
         row.marks.subject.clone_from(&job.subject);
     }
-    Results::open(dir, false)?.label(&job.group, &job.subject)?;
+    scan.results().label(&job.group, &job.subject)?;
     answer::keep(dir, &rows, recipe.error)?;
     Ok(rows)
 }

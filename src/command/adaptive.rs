@@ -7,9 +7,11 @@
 mod strength;
 
 use crate::command::answer;
-use crate::command::estimate;
+use crate::command::estimate::FreeMemory;
 use crate::command::in_words::{answer_in_words, in_words};
-use crate::command::ladder::{COARSENED, ONE_REFINEMENT, REFINED, smoothed_again, voxel_fe};
+use crate::command::ladder::{
+    COARSENED, ONE_REFINEMENT, REFINED, smoothed_again, split_voxels, voxel_fe,
+};
 use crate::command::solve::OpenScan;
 use crate::error::Result;
 use crate::machine::session::Session;
@@ -35,30 +37,60 @@ pub struct Found {
 /// # Errors
 /// As [`crate::command::solve::solve`].
 pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session) -> Result<Found> {
+    let mut scan = OpenScan::open(dir, &widest(params), session.force, session)?;
+    solve_open_to(&mut scan, target, params, session)
+}
+
+/// Settings of the solve that needs the most of a scan, of all that a target may take: those to open it with.
+pub fn widest(params: &SolveParams) -> SolveParams {
+    match params.plasticity {
+        Some(_) => split_voxels(params, 1),
+        None => smoothed_again(params),
+    }
+}
+
+/// [`solve_to`] of a scan that was opened with the settings of [`widest`].
+///
+/// # Errors
+/// As [`crate::command::solve::solve`].
+pub fn solve_open_to(
+    scan: &mut OpenScan,
+    target: f64,
+    params: &SolveParams,
+    session: &Session,
+) -> Result<Found> {
     let params = SolveParams {
         // A tenth of the whole error is left to the solver.
         tolerance: params.tolerance.min(0.1 * target),
         ..params.clone()
     };
-    if params.plasticity.is_some() {
-        return strength::solve_to(dir, target, &params, session);
-    }
-    let mut scan = OpenScan::open(dir, &smoothed_again(&params), session.force, session)?;
     if !session.dry_run {
         // Notes of an earlier target.
         scan.results().edit_rows(ErrorTargetNote::remove_note)?;
     }
+    let rows = match params.plasticity {
+        Some(_) => strength::rows(scan, target, &params, session)?,
+        None => rows(scan, target, &params, session)?,
+    };
+    finish(scan, rows, target, session)
+}
+
+/// All that is solved until the error of the modulus meets its target.
+fn rows(
+    scan: &mut OpenScan,
+    target: f64,
+    params: &SolveParams,
+    session: &Session,
+) -> Result<Vec<Row>> {
     let mut climb = Climb {
-        scan: &mut scan,
+        scan,
         target,
-        params: &params,
+        params,
         session,
-        dir,
         rows: Vec::new(),
     };
     climb.climb()?;
-    let rows = climb.rows;
-    finish(&mut scan, rows, target, session)
+    Ok(climb.rows)
 }
 
 /// One specimen on its way to a target.
@@ -67,7 +99,6 @@ struct Climb<'a> {
     target: f64,
     params: &'a SolveParams,
     session: &'a Session,
-    dir: &'a Path,
     /// All that was solved so far.
     rows: Vec<Row>,
 }
@@ -165,13 +196,13 @@ impl Climb<'_> {
 
     fn answer(&self) -> Result<()> {
         if !self.session.dry_run {
-            answer::keep(self.dir, &self.rows, Some(self.target))?;
+            answer::keep(self.scan.dir(), &self.rows, Some(self.target))?;
         }
         Ok(())
     }
 
     fn fits(&self, params: &SolveParams) -> Result<()> {
-        estimate::refuse_what_does_not_fit(&of_voxels(), self.scan.prepared(), params)
+        of_voxels().fits(self.scan.prepared(), params, &FreeMemory::now())
     }
 
     fn is_done(&self) -> bool {

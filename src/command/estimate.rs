@@ -4,6 +4,7 @@ use crate::command::ladder;
 use crate::error::{Error, Result};
 use crate::image::extent;
 use crate::machine::host;
+use crate::pipeline::apparent::discretisation::memory::Memory;
 use crate::pipeline::apparent::discretisation::{Cost, Known, Prepared, Resolution};
 use crate::pipeline::apparent::job::{Job, bone_connects};
 use crate::pipeline::apparent::tissue::Tissue;
@@ -169,14 +170,14 @@ pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Re
 
 /// The cost of a solve, its bytes counted unless it takes more than is free in any case.
 fn needed(job: &Job, prepared: Prepared, params: &SolveParams) -> Result<Cost> {
-    let cost = job.cost(params, Known::Volume(prepared))?;
+    let cost = job.cost(params, Known::Bone(prepared))?;
     let [least, _] = cost.bytes;
     match host::available_mib() {
         Some(free) if mib(least) > free => Ok(Cost {
             bytes: [least; 2],
             ..cost
         }),
-        _ => job.cost(params, Known::Bone(prepared)),
+        _ => job.counted_cost(prepared, params),
     }
 }
 
@@ -197,26 +198,34 @@ pub fn refuse_lattice_that_does_not_fit(
     prepared: Prepared,
     params: &SolveParams,
 ) -> Result<()> {
-    let cost = job.cost(params, Known::Volume(prepared))?;
-    refuse("lattice", cost.bytes[0] * BUILT, cost.resolution)
+    let cost = job.cost(params, Known::Bone(prepared))?;
+    let free = host::available_mib();
+    refuse("lattice", cost.bytes[0] * BUILT, cost.resolution, free)
 }
 
-/// Refuses a solve that this machine has no memory for, and says what it has memory for.
-///
-/// # Errors
-/// A solve that needs more than is free.
-#[doc(hidden)]
-pub fn refuse_what_does_not_fit(job: &Job, prepared: Prepared, params: &SolveParams) -> Result<()> {
-    let Some(free) = host::available_mib() else {
-        return Ok(());
-    };
-    let [_, most] = job.cost(params, Known::Volume(prepared))?.bytes;
-    // Counting takes time, and memory on lattices, so it is left out where there is no question.
-    if mib(most) < 0.5 * free {
-        return Ok(());
+/// The memory that is free, which a solve may take.
+pub struct FreeMemory {
+    /// None where the system does not say.
+    mib: Option<f64>,
+}
+
+impl FreeMemory {
+    /// What is free now.
+    pub fn now() -> Self {
+        FreeMemory {
+            mib: host::available_mib(),
+        }
     }
-    let cost = needed(job, prepared, params)?;
-    refuse("solve", cost.bytes[0], cost.resolution)
+}
+
+impl Memory for FreeMemory {
+    fn surely_holds(&self, bytes: f64) -> bool {
+        self.mib.is_none_or(|free| mib(bytes) < 0.5 * free)
+    }
+
+    fn refuse(&self, cost: &Cost) -> Result<()> {
+        refuse("solve", cost.bytes[0], cost.resolution, self.mib)
+    }
 }
 
 /// MiB that the program takes while it solves this.
@@ -227,13 +236,13 @@ pub fn refuse_what_does_not_fit(job: &Job, prepared: Prepared, params: &SolvePar
 pub fn of_solve_mib(job: &Job, prepared: Prepared, params: &SolveParams) -> Result<f64> {
     let cost = needed(job, prepared, params)?;
     let [bytes, _] = cost.bytes;
-    refuse("solve", bytes, cost.resolution)?;
+    FreeMemory::now().refuse(&cost)?;
     Ok(mib(BASE + kept_bytes(prepared.specimen, params) + bytes))
 }
 
-fn refuse(what: &str, bytes: f64, resolution: Resolution) -> Result<()> {
+fn refuse(what: &str, bytes: f64, resolution: Resolution, free_mib: Option<f64>) -> Result<()> {
     let needed = mib(bytes);
-    match host::available_mib() {
+    match free_mib {
         Some(free) if needed >= free => Err(Error::specimen(
             format!("this {what} needs about {needed:.0} MiB, {free:.0} MiB are free"),
             format!("crop the scan, or {}", coarser(resolution, needed / free)),

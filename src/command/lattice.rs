@@ -1,7 +1,6 @@
 //! Owns `lattice` on disk: builds the lattices of a segmented scan, reports their counts, exports them.
 
 use crate::command::estimate::refuse_lattice_that_does_not_fit;
-use crate::command::segment::load;
 use crate::discretisation::lattice::connected::ConnectedSites;
 use crate::discretisation::lattice::sites::Sites;
 use crate::error::{Error, Result};
@@ -62,17 +61,18 @@ pub fn lattice(
 ) -> Result<Vec<LatticeSummary>> {
     params.check()?;
     exports.tissue.check()?;
-    let mut specimen = load(dir)?;
+    let mut scan = specimen::load(dir)?;
     let factors = match exports.tissue.material {
         None => None,
         Some(_) => {
-            specimen::add_grey(dir, &mut specimen)?;
-            match Tissue::of(&specimen, &exports.tissue)? {
+            scan.add_grey(dir)?;
+            match Tissue::of(&scan.specimen, &exports.tissue)? {
                 Tissue::Uniform(solid) => Some((solid.young_mpa, None)),
                 Tissue::Mixed(mixed) => Some((mixed.mean_mpa, Some(mixed.factor))),
             }
         }
     };
+    let specimen = scan.specimen;
     let (young_mpa, factors) = factors.unwrap_or((exports.tissue.young_mpa, None));
     let written = Written {
         dir,

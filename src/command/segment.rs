@@ -30,21 +30,31 @@ pub fn segment(
     if !session.dry_run {
         atomic::sweep(dir);
     }
-    let blake3 = scan::hash(input)?;
     let voi_blake3 = match &params.voi {
         Voi::Mask(path) => Some(scan::hash(path)?),
         _ => None,
     };
-    if let Some(kept) = specimen::record(dir)
-        && !session.force
-        && name.is_none_or(|name| name == kept.scan)
-        && up_to_date(&kept, dir, params, (&blake3, &voi_blake3))
-    {
-        session.say(format!("{}: up to date", dir.display()));
-        results::set_aside_stale(dir, session);
-        return Ok(kept);
-    }
-    let whole = read(input, name, params, session)?;
+    let kept = specimen::record(dir).filter(|kept| {
+        let is_of_it = name.is_none_or(|name| name == kept.scan);
+        !session.force && is_of_it && is_whole(kept, dir, params)
+    });
+    let (blake3, whole) = match kept {
+        Some(kept) => {
+            let blake3 = scan::hash(input)?;
+            if kept.input.blake3 == blake3 && kept.input.voi_blake3 == voi_blake3 {
+                session.say(format!("{}: up to date", dir.display()));
+                results::set_aside_stale(dir, session);
+                return Ok(kept);
+            }
+            (blake3, read(input, name, params, session)?)
+        }
+        // Both at once: what one has read from the disk, the other finds in memory.
+        None => {
+            let read = || read(input, name, params, session);
+            let (blake3, whole) = rayon::join(|| scan::hash(input), read);
+            (blake3?, whole?)
+        }
+    };
     let scan = &whole.scan;
     let mut segmented = whole.segmented(params)?;
     let warnings = &mut segmented.summary.warnings;
@@ -229,20 +239,17 @@ fn values_out_of_unit(scan: &Scan, params: &SegmentParams) -> Option<String> {
 }
 
 /// The specimen that `segment` left in `dir`.
+///
+/// # Errors
+/// No segmented scan there, a damaged one.
 pub fn load(dir: &Path) -> Result<Specimen> {
-    specimen::load(dir)
+    Ok(specimen::load(dir)?.specimen)
 }
 
-fn up_to_date(
-    kept: &SegmentRecord,
-    dir: &Path,
-    params: &SegmentParams,
-    (blake3, voi_blake3): (&String, &Option<String>),
-) -> bool {
+/// Whether what is kept was made with these settings by this version, and is all there.
+fn is_whole(kept: &SegmentRecord, dir: &Path, params: &SegmentParams) -> bool {
     kept.version == env!("CARGO_PKG_VERSION")
         && kept.settings == *params
-        && kept.input.blake3 == *blake3
-        && kept.input.voi_blake3 == *voi_blake3
         && dir.join(specimen::MASK).is_file()
         && dir.join(specimen::PICTURE).is_file()
         && (!params.keeps_grey() || dir.join(specimen::GREY).is_file())

@@ -9,6 +9,7 @@ use crate::command::{estimate, stiffness};
 use crate::error::Result;
 use crate::export::inp;
 use crate::export::tetrahedra::{self, Kind};
+use crate::format::orient::Turn;
 use crate::io::atomic;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
@@ -21,8 +22,8 @@ use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::{Load, SolveParams, jobs};
 use crate::pipeline::lattice::LatticeParams;
 use crate::record::details;
-use crate::record::results::Results;
-use crate::record::specimen;
+use crate::record::results::{self, Results};
+use crate::record::specimen::{self, SegmentedScan};
 use crate::result::cautions;
 use crate::result::derived::with_derived;
 use crate::result::details::Details;
@@ -49,6 +50,8 @@ pub struct OpenScan {
     /// As `segment` measured them.
     strut_thickness_mm: Option<f64>,
     morphometry: Option<Morphometry>,
+    /// From the order of the files of voxels to x, y, z of the results.
+    axes: Turn,
     image: Image,
 }
 
@@ -86,16 +89,19 @@ impl OpenScan {
         if !session.dry_run {
             atomic::sweep(dir);
         }
-        let specimen = loaded(dir, params)?;
-        let measured = specimen::record(dir).map(|record| record.results);
+        results::keep_other_version(dir, session);
+        let scan = loaded(dir, params)?;
+        let image = scan.image();
+        let (specimen, measured) = (scan.specimen, scan.record.results);
         Ok(OpenScan {
             tissue: Tissue::of(&specimen, params)?,
-            results: Results::open(dir, redo)?,
+            results: Results::open(dir, &scan.mask_blake3, scan.record_json, redo),
             plate_thickness_mm: plate_thickness_mm(&specimen.bone),
-            strut_thickness_mm: measured.as_ref().and_then(|m| m.mean_thickness_mm),
-            morphometry: measured.and_then(|m| m.morphometry),
+            strut_thickness_mm: measured.mean_thickness_mm,
+            morphometry: measured.morphometry,
             dir: dir.to_path_buf(),
-            image: specimen::image(dir),
+            axes: scan.record.input.axes,
+            image,
             specimen,
         })
     }
@@ -112,6 +118,11 @@ impl OpenScan {
             specimen: &self.specimen,
             tissue: &self.tissue,
         }
+    }
+
+    /// The scan's folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
     }
 
     /// What the scan says of the surface within a voxel.
@@ -256,7 +267,6 @@ impl OpenScan {
             ));
             return Ok(None);
         }
-        estimate::refuse_what_does_not_fit(job, prepared, params)?;
         self.solve_job(job, blank, params, session).map(Some)
     }
 
@@ -279,7 +289,8 @@ impl OpenScan {
         bar.set_message("building the model and its multigrid");
         let loads = if params.load == Load::Stiffness { 6 } else { 1 };
         let mut kept = KeptSteps::new(&self.dir, self.results.fingerprint(blank, params), session);
-        let solution = job.solve(prepared, params, &mut kept, &mut |load, step| {
+        let memory = &estimate::FreeMemory::now();
+        let solution = job.solve(prepared, params, memory, &mut kept, &mut |load, step| {
             show(&bar, [load, loads], step, params.tolerance);
         })?;
         bar.finish_and_clear();
@@ -292,7 +303,7 @@ impl OpenScan {
                 }
                 let stem = format!("{}-{}", name(&blank.key).replace(' ', "-"), blank.key.lp_mm);
                 let details = std::mem::take(&mut recorded.details);
-                let fields = Fields::of(stem, recorded, specimen::axes(&self.dir));
+                let fields = Fields::of(stem, recorded, self.axes);
                 (row, details, fields)
             }
             JobResult::Stiffness(solved) => {
@@ -398,12 +409,12 @@ fn warn_of_unusual(settings: &Settings, height_mm: f64, session: &Session) {
 }
 
 /// With grey values where the material asks for them.
-fn loaded(dir: &Path, params: &SolveParams) -> Result<Specimen> {
-    let mut specimen = specimen::load(dir)?;
+fn loaded(dir: &Path, params: &SolveParams) -> Result<SegmentedScan> {
+    let mut scan = specimen::load(dir)?;
     if params.needs_grey() {
-        specimen::add_grey(dir, &mut specimen)?;
+        scan.add_grey(dir)?;
     }
-    Ok(specimen)
+    Ok(scan)
 }
 
 /// Writes the voxel elements of the specimen in `dir`, with materials (at most `bins` moduli), supports and load, to
@@ -418,7 +429,7 @@ pub fn export_inp(dir: &Path, params: &SolveParams, bins: usize, session: &Sessi
         session.say(format!("would write {}", path.display()));
         return Ok(());
     }
-    let worst = inp::write(&path, &loaded(dir, params)?, params, bins)?;
+    let worst = inp::write(&path, &loaded(dir, params)?.specimen, params, bins)?;
     session.say(binned(&path, worst));
     Ok(())
 }
@@ -441,7 +452,7 @@ pub fn export_smooth(
         session.say(format!("would write {}", path.display()));
         return Ok(());
     }
-    let worst = tetrahedra::write(&path, kind, &loaded(dir, params)?, params, bins)?;
+    let worst = tetrahedra::write(&path, kind, &loaded(dir, params)?.specimen, params, bins)?;
     session.say(binned(&path, worst));
     Ok(())
 }

@@ -119,11 +119,24 @@ pub fn read_as(path: &Path, reading: &Reading) -> Result<Scan> {
 /// Values of a file that this program wrote on the grid of a scan, brought to the axes that `turn` made of the stored
 /// ones. `spacing_mm` is the voxel size along the turned axes.
 pub fn read_turned(path: &Path, turn: &Turn, spacing_mm: [f64; 3]) -> Result<Volume<f32>> {
-    let stored = stored(path)?;
+    Ok(turned(stored(path)?, turn, spacing_mm))
+}
+
+/// [`read_turned`] of the bytes of a NIfTI file that was read before; `path` names it in errors.
+pub fn turned_of_bytes(
+    (path, bytes): (&Path, Vec<u8>),
+    turn: &Turn,
+    spacing_mm: [f64; 3],
+) -> Result<Volume<f32>> {
+    let stored = checked(path, nifti::of_bytes(path, bytes)?)?;
+    Ok(turned(stored, turn, spacing_mm))
+}
+
+fn turned(stored: Stored, turn: &Turn, spacing_mm: [f64; 3]) -> Volume<f32> {
     let grid = Grid::new(stored.n, turn.inverse().from.map(|r| spacing_mm[r]));
     let mut volume = Volume::from_vec(grid, stored.values);
     volume.affine = stored.affine;
-    Ok(orient::turned(volume, turn))
+    orient::turned(volume, turn)
 }
 
 /// Files of other formats hold the unit they were saved in: nothing to convert, but a contradiction is an error.
@@ -174,7 +187,10 @@ pub fn stored(path: &Path) -> Result<Stored> {
 
 /// The same; `raw` is what is in a file without a header.
 pub fn stored_as(path: &Path, raw: Option<Contents>) -> Result<Stored> {
-    let mut stored = by_format(path, raw)?;
+    checked(path, by_format(path, raw)?)
+}
+
+fn checked(path: &Path, mut stored: Stored) -> Result<Stored> {
     stored.spacing_mm = stored
         .spacing_mm
         .filter(|s| s.iter().all(|&v| v > 0.0 && v.is_finite()));

@@ -263,7 +263,15 @@ pub fn build_connected(
     Ok(ConnectedSites::connect(frame, &specimen.bone, grips))
 }
 
+#[cfg(test)]
+thread_local! {
+    /// How many lattices this thread has placed.
+    pub static PLACED: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+}
+
 fn place(specimen: &Specimen, case: &Case, axis: Axis, grip_mm: f64) -> Result<(Frame, Grips)> {
+    #[cfg(test)]
+    PLACED.set(PLACED.get() + 1);
     let frame = Frame::new(
         &specimen.bone.grid,
         case.structure,

@@ -2,7 +2,7 @@
 //! `results.json`. Both are written whole after each solve; what is there for the same mask, settings and version is not
 //! redone.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io::own_files::RESULTS;
 use crate::io::{atomic, table};
 use crate::machine::host;
@@ -39,14 +39,41 @@ pub fn has_old(dir: &Path) -> bool {
 
 /// The same where the mask in `dir` is not that of the results.
 pub fn set_aside_stale(dir: &Path, session: &Session) {
-    let (Some(old), Ok(now)) = (Record::read(dir), Provenance::now(dir)) else {
+    keep_other_version(dir, session);
+    if session.dry_run {
+        return;
+    }
+    let (Some(old), Ok(mask)) = (Record::read(dir), std::fs::read(dir.join(specimen::MASK))) else {
         return;
     };
-    let stale = !session.dry_run && old.provenance.mask_blake3 != now.mask_blake3;
-    if stale && set_aside(dir) {
+    let now = blake3::hash(&mask).to_hex();
+    if old.provenance.mask_blake3 != now.as_str() && set_aside(dir) {
         session.say(format!(
             "{}: the mask has changed: the results of the old mask are set aside as {OLD_TABLE}",
             dir.display()
+        ));
+    }
+}
+
+/// Keeps the results in `dir` under another name where another version made them: its rows are not mixed with those of this one.
+pub fn keep_other_version(dir: &Path, session: &Session) {
+    let table = dir.join(RESULTS);
+    if session.dry_run || !table.is_file() {
+        return;
+    }
+    let version = Record::read(dir).map(|record| record.provenance.version);
+    if version.as_deref() == Some(env!("CARGO_PKG_VERSION")) {
+        return;
+    }
+    // Of a record that cannot be read, or of none, only this is known.
+    let version = version.unwrap_or_else(|| "other".to_owned());
+    let kept = format!("results-{version}.csv");
+    details::remove(dir);
+    if std::fs::rename(&table, dir.join(&kept)).is_ok() {
+        session.say(format!(
+            "{}: the results there are not of version {} of the program ({version}): they are kept as {kept}",
+            dir.display(),
+            env!("CARGO_PKG_VERSION"),
         ));
     }
 }
@@ -83,6 +110,7 @@ struct Record {
     rows: Vec<KeyedRow>,
 }
 
+// `segment.json` and `stiffness.json` have only program and version in common with this: a struct for two lines would be longer than they are.
 /// Where results come from, enough to make them again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Provenance {
@@ -124,13 +152,11 @@ pub struct Results {
 }
 
 impl Results {
-    /// Opens the results in `dir`; empty where there are none, or where they belong to another mask or version. With `redo` no
-    /// row is found before its solve was made again; rows of other settings stay.
-    ///
-    /// # Errors
-    /// A mask that cannot be read.
-    pub fn open(dir: &Path, redo: bool) -> Result<Self> {
-        let provenance = Provenance::now(dir)?;
+    /// Opens the results in `dir` of the mask of this hash, which `segment` (the content of `segment.json`) says how to make; empty where
+    /// there are none, or where they belong to another mask or version. With `redo` no row is found before its solve was made again; rows
+    /// of other settings stay.
+    pub fn open(dir: &Path, mask_blake3: &str, segment: Value, redo: bool) -> Self {
+        let provenance = Provenance::now(mask_blake3, segment);
         let old = Record::read(dir);
         let same = |r: &Record| {
             r.provenance.mask_blake3 == provenance.mask_blake3
@@ -139,11 +165,11 @@ impl Results {
         let mut rows = old.filter(same).map_or(Vec::new(), |r| r.rows);
         // Means are computed again from what was solved.
         rows.retain(|row| row.key.is_some());
-        Ok(Results {
+        Results {
             dir: dir.to_path_buf(),
             record: Record { provenance, rows },
             redone: redo.then(BTreeSet::new),
-        })
+        }
     }
 
     /// The converged row that follows from the same settings, if it was made before. `blank` is the row before its
@@ -292,26 +318,16 @@ impl Record {
 }
 
 impl Provenance {
-    fn now(dir: &Path) -> Result<Self> {
-        let mask = dir.join(specimen::MASK);
-        let bytes = std::fs::read(&mask).map_err(|e| {
-            Error::file(
-                &mask,
-                format!("cannot be read: {e}"),
-                "run `bonepd-ct segment` first",
-            )
-            .caused_by(e)
-        })?;
-        let segment = std::fs::read(dir.join(specimen::RECORD)).unwrap_or_default();
-        Ok(Provenance {
+    fn now(mask_blake3: &str, segment: Value) -> Self {
+        Provenance {
             program: env!("CARGO_PKG_NAME").to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             date: host::date(),
             host: host::name(),
             threads: rayon::current_num_threads(),
-            mask_blake3: blake3::hash(&bytes).to_hex().to_string(),
-            segment: serde_json::from_slice(&segment).unwrap_or_default(),
-        })
+            mask_blake3: mask_blake3.to_owned(),
+            segment,
+        }
     }
 }
 
@@ -351,17 +367,15 @@ mod tests {
         }
     }
 
-    fn folder() -> tempfile::TempDir {
-        let dir = tempfile::tempdir().unwrap();
-        std::fs::write(dir.path().join(specimen::MASK), "mask").unwrap();
-        dir
+    fn opened(dir: &tempfile::TempDir, mask_blake3: &str, redo: bool) -> Results {
+        Results::open(dir.path(), mask_blake3, Value::Null, redo)
     }
 
     #[test]
     fn rows_are_found_again_for_the_same_settings_only() {
-        let dir = folder();
+        let dir = tempfile::tempdir().unwrap();
         let params = SolveParams::default();
-        let mut results = Results::open(dir.path(), false).unwrap();
+        let mut results = opened(&dir, "mask", false);
         results
             .store(&blank(FIRM), &params, &solved(FIRM, 1.0 / 3.0), None)
             .unwrap();
@@ -369,7 +383,7 @@ mod tests {
             .store(&blank(FLOPPY), &params, &solved(FLOPPY, 0.1), None)
             .unwrap();
 
-        let again = Results::open(dir.path(), false).unwrap();
+        let again = opened(&dir, "mask", false);
         assert_eq!(
             again.find(&blank(FIRM), &params),
             Some(solved(FIRM, 1.0 / 3.0))
@@ -383,26 +397,18 @@ mod tests {
         assert_eq!(table.len(), 3);
         assert_eq!(table[2].key.boundary, Some(BoundaryRule::Ffb));
 
+        assert_eq!(opened(&dir, "mask", true).find(&blank(FIRM), &params), None);
         assert_eq!(
-            Results::open(dir.path(), true)
-                .unwrap()
-                .find(&blank(FIRM), &params),
-            None
-        );
-        std::fs::write(dir.path().join(specimen::MASK), "another").unwrap();
-        assert_eq!(
-            Results::open(dir.path(), false)
-                .unwrap()
-                .find(&blank(FIRM), &params),
+            opened(&dir, "another", false).find(&blank(FIRM), &params),
             None
         );
     }
 
     #[test]
     fn a_row_that_did_not_converge_is_solved_again_and_replaced() {
-        let dir = folder();
+        let dir = tempfile::tempdir().unwrap();
         let params = SolveParams::default();
-        let mut results = Results::open(dir.path(), false).unwrap();
+        let mut results = opened(&dir, "mask", false);
         let mut stalled = solved(FIRM, 2.0);
         stalled.solved.as_mut().unwrap().converged = Some(false);
         results

@@ -9,6 +9,7 @@ use crate::pipeline::segment::{SegmentParams, SegmentSummary, Surface, shown};
 use crate::result::shape::Image;
 use crate::volume::{Specimen, Threshold, Volume};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// `segment.json`: what was segmented, how, and what came out; enough to repeat it.
@@ -73,104 +74,122 @@ pub fn record(dir: &Path) -> Option<SegmentRecord> {
     serde_json::from_str(&text).ok()
 }
 
-/// From the order of the files of voxels in `dir` to x, y, z of the results.
-pub fn axes(dir: &Path) -> Turn {
-    record(dir).map_or(Turn::default(), |record| record.input.axes)
+/// A segmented scan, read from its folder.
+pub struct SegmentedScan {
+    /// The mask, with the grey values once they were asked for.
+    pub specimen: Specimen,
+    /// How it was made.
+    pub record: SegmentRecord,
+    /// The same as it stands in the folder.
+    pub record_json: Value,
+    /// BLAKE3 of the file of the mask.
+    pub mask_blake3: String,
 }
 
-/// The specimen that `segment` left in `dir`.
-pub fn load(dir: &Path) -> Result<Specimen> {
+/// The specimen that `segment` left in `dir`. Each file is read once.
+///
+/// # Errors
+/// No segmented scan there, a damaged one.
+pub fn load(dir: &Path) -> Result<SegmentedScan> {
     let path = dir.join(RECORD);
     let again = "segment the scan first: bonepd-ct segment SCAN -o DIR --lower VALUE";
     let text = std::fs::read_to_string(&path).map_err(|e| {
         Error::file(&path, format!("no segmented scan here ({e})"), again).caused_by(e)
     })?;
-    let record: SegmentRecord = serde_json::from_str(&text).map_err(|e| {
-        Error::file(
-            &path,
-            format!("is no record of a segmentation ({e})"),
-            again,
-        )
-        .caused_by(e)
-    })?;
+    let unknown = |e: serde_json::Error| {
+        let found = format!("is no record of a segmentation ({e})");
+        Error::file(&path, found, again).caused_by(e)
+    };
+    let record: SegmentRecord = serde_json::from_str(&text).map_err(unknown)?;
+    let record_json = serde_json::from_str(&text).map_err(unknown)?;
     let mask = dir.join(MASK);
-    let axes = record.input.axes;
-    let stored = scan::read_turned(&mask, &axes, record.results.spacing_mm)?;
-    if stored.grid.n != record.results.voxels {
+    let bytes = std::fs::read(&mask)
+        .map_err(|e| Error::file(&mask, format!("cannot be read: {e}"), again).caused_by(e))?;
+    let mask_blake3 = blake3::hash(&bytes).to_hex().to_string();
+    let results = &record.results;
+    let stored = scan::turned_of_bytes((&mask, bytes), &record.input.axes, results.spacing_mm)?;
+    if stored.grid.n != results.voxels {
         return Err(Error::file(
             &mask,
             format!(
                 "has {:?} voxels where {RECORD} says {:?}",
-                stored.grid.n, record.results.voxels
+                stored.grid.n, results.voxels
             ),
             again,
         ));
     }
-    Ok(Specimen {
-        name: record.scan,
-        bone: mask_of(&stored),
-        tv_mm3: record.results.tv_mm3,
-        tv_definition: record.results.tv_definition,
-        grey: None,
-        threshold: None,
+    Ok(SegmentedScan {
+        specimen: Specimen {
+            name: record.scan.clone(),
+            bone: mask_of(&stored),
+            tv_mm3: results.tv_mm3,
+            tv_definition: results.tv_definition.clone(),
+            grey: None,
+            threshold: None,
+        },
+        record,
+        record_json,
+        mask_blake3,
     })
 }
 
-/// What the segmented scan in `dir` says of the surface within a voxel.
-pub fn image(dir: &Path) -> Image {
-    let results = record(dir).map(|record| record.results);
-    match results {
-        Some(r) if r.surface == Surface::Grey => Image::Grey {
-            blur_voxels: r.blur_voxels.unwrap_or(0.0),
-        },
-        _ => Image::Mask,
+impl SegmentedScan {
+    /// What is known of the surface within a voxel.
+    pub fn image(&self) -> Image {
+        let results = &self.record.results;
+        match results.surface {
+            Surface::Grey => Image::Grey {
+                blur_voxels: results.blur_voxels.unwrap_or(0.0),
+            },
+            _ => Image::Mask,
+        }
     }
-}
 
-/// Gives a specimen the grey values that `segment` kept in `dir`, and how its bone follows from them. Without kept values
-/// it stays as it is.
-///
-/// # Errors
-/// Values on another grid than the mask's, unreadable files.
-pub fn add_grey(dir: &Path, specimen: &mut Specimen) -> Result<()> {
-    let path = dir.join(GREY);
-    if !path.exists() {
-        return Ok(());
+    /// Gives the specimen the grey values that `segment` kept in `dir`, and how its bone follows from them. Without kept values
+    /// it stays as it is.
+    ///
+    /// # Errors
+    /// Values on another grid than the mask's, unreadable files.
+    pub fn add_grey(&mut self, dir: &Path) -> Result<()> {
+        if !dir.join(GREY).exists() {
+            return Ok(());
+        }
+        self.specimen.grey = Some(self.on_the_masks_grid(&dir.join(GREY))?);
+        let results = &self.record.results;
+        if results.surface != Surface::Grey {
+            return Ok(());
+        }
+        let voi = dir.join(VOI);
+        let inside = match voi.exists() {
+            true => Some(mask_of(&self.on_the_masks_grid(&voi)?)),
+            false => None,
+        };
+        self.specimen.threshold = Some(Threshold {
+            lower: results.lower.map_or(f32::NEG_INFINITY, |v| v as f32),
+            upper: results.upper.map_or(f32::INFINITY, |v| v as f32),
+            inside,
+            keep_all: self.record.settings.keep_all,
+            blur_voxels: results.blur_voxels,
+        });
+        Ok(())
     }
-    specimen.grey = Some(on_grid_of(dir, &specimen.bone, GREY)?);
-    let Some(record) = record(dir).filter(|r| r.results.surface == Surface::Grey) else {
-        return Ok(());
-    };
-    let inside = match dir.join(VOI).exists() {
-        true => Some(mask_of(&on_grid_of(dir, &specimen.bone, VOI)?)),
-        false => None,
-    };
-    let (lower, upper) = (record.results.lower, record.results.upper);
-    specimen.threshold = Some(Threshold {
-        lower: lower.map_or(f32::NEG_INFINITY, |v| v as f32),
-        upper: upper.map_or(f32::INFINITY, |v| v as f32),
-        inside,
-        keep_all: record.settings.keep_all,
-        blur_voxels: record.results.blur_voxels,
-    });
-    Ok(())
-}
 
-/// A file of `dir` along the axes of the mask.
-fn on_grid_of(dir: &Path, bone: &Volume<u8>, file: &str) -> Result<Volume<f32>> {
-    let path = &dir.join(file);
-    let volume = scan::read_turned(path, &axes(dir), bone.grid.spacing_mm)?;
-    if volume.grid.n != bone.grid.n {
-        return Err(Error::file(
-            path,
-            format!(
-                "has {:?} voxels where the mask has {:?}",
-                volume.grid.n, bone.grid.n
-            ),
-            "segment the scan again",
-        ));
+    /// A file along the axes of the mask.
+    fn on_the_masks_grid(&self, path: &Path) -> Result<Volume<f32>> {
+        let grid = &self.specimen.bone.grid;
+        let volume = scan::read_turned(path, &self.record.input.axes, grid.spacing_mm)?;
+        match volume.grid.n == grid.n {
+            true => Ok(volume),
+            false => Err(Error::file(
+                path,
+                format!(
+                    "has {:?} voxels where the mask has {:?}",
+                    volume.grid.n, grid.n
+                ),
+                "segment the scan again",
+            )),
+        }
     }
-    Ok(volume)
 }
 
 /// Non-zero is inside.

@@ -12,12 +12,14 @@ pub mod step_statistics;
 use crate::discretisation::plane::Points;
 use crate::discretisation::plane::geometry::Geometry;
 use crate::error::{ADVICE, Error, Result};
+use crate::physics::bond_based::BondBased;
 use conditions::{Hold, Layers, Load, Time};
 use continuum_molecular::Molecular;
 use frame::{Observer, Output, Summary};
 use remodelling::bond_based::BondBasedParams;
-use remodelling::continuum::ContinuumParams;
-use remodelling::{bond_based, continuum};
+use remodelling::continuum::{ContinuumParams, Local};
+use remodelling::marcher::Marcher;
+use remodelling::{bond_based, continuum, time_loop};
 use serde::{Deserialize, Serialize};
 use setting::{GridParams, Inputs, Probe, Setting};
 use std::path::Path;
@@ -134,8 +136,8 @@ pub struct Checked<'a> {
 
 /// What a scene's physics sets up.
 enum Model<'a> {
-    BondBased(Box<bond_based::Peridynamic>),
-    Continuum(Box<continuum::Local>),
+    BondBased(Box<Marcher<BondBased>>),
+    Continuum(Box<Marcher<Local>>),
     ContinuumMolecular(Box<continuum_molecular::check::Checked<'a>>),
 }
 
@@ -146,10 +148,14 @@ pub fn check<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Result<Checked<'a>> {
     setting.output.check()?;
     let model = match &scene.physics {
         Physics::BondBased(params) => {
-            Model::BondBased(Box::new(bond_based::check(setting, params, inputs)?))
+            let marcher = bond_based::marcher(setting, params, inputs)?;
+            time_loop::check(setting)?;
+            Model::BondBased(Box::new(marcher))
         }
         Physics::Continuum(params) => {
-            Model::Continuum(Box::new(continuum::check(setting, params, inputs)?))
+            let marcher = continuum::marcher(setting, params, inputs)?;
+            time_loop::check(setting)?;
+            Model::Continuum(Box::new(marcher))
         }
         Physics::ContinuumMolecular(model) => {
             let checked = continuum_molecular::check::check(setting, model, inputs)?;
@@ -171,13 +177,10 @@ impl Checked<'_> {
 
     /// Runs the scene, reporting states to `observer` as they are accepted.
     pub fn run(self, observer: &mut dyn Observer) -> Result<Summary> {
-        let setting = &self.scene.setting;
+        let (setting, inputs) = (&self.scene.setting, self.inputs);
         match self.model {
-            Model::BondBased(model) => {
-                let points = setting.points(self.inputs)?;
-                bond_based::run(*model, setting, &points, observer)
-            }
-            Model::Continuum(model) => continuum::run(*model, setting, observer),
+            Model::BondBased(marcher) => time_loop::run(*marcher, setting, inputs, observer),
+            Model::Continuum(marcher) => time_loop::run(*marcher, setting, inputs, observer),
             Model::ContinuumMolecular(checked) => checked.run(observer),
         }
     }

@@ -7,7 +7,7 @@
 mod specimen;
 
 use bonepd_ct::pipeline::apparent::SolveParams;
-use bonepd_ct::pipeline::apparent::discretisation::{Known, Prepared};
+use bonepd_ct::pipeline::apparent::discretisation::Prepared;
 use bonepd_ct::pipeline::apparent::job::Job;
 use bonepd_ct::pipeline::apparent::solve_lattice;
 use bonepd_ct::pipeline::apparent::solve_voxels;
@@ -126,7 +126,9 @@ fn main() {
 
 fn predicted(job: &Job, specimen: &Specimen, params: &SolveParams) -> f64 {
     let tissue = &Tissue::of(specimen, params).expect("one solid");
-    let known = Known::Bone(Prepared { specimen, tissue });
-    let cost = job.cost(params, known).expect("a model that fits");
+    let prepared = Prepared { specimen, tissue };
+    let cost = job
+        .counted_cost(prepared, params)
+        .expect("a model that fits");
     cost.bytes[1]
 }

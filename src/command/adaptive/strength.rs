@@ -3,19 +3,16 @@
 //!
 //! Load steps are compared on one element a voxel, where they are cheap. Elements are voxels, whole and split: one body.
 
-use super::Found;
-use crate::command::estimate;
+use crate::command::estimate::FreeMemory;
 use crate::command::ladder::split_voxels;
 use crate::command::solve::OpenScan;
 use crate::error::Result;
 use crate::machine::session::Session;
 use crate::pipeline::apparent::{SolveParams, of_voxels};
 use crate::pipeline::lattice::LatticeParams;
-use crate::record::error_target_note::ErrorTargetNote;
 use crate::result::notes;
 use crate::result::row::Row;
 use crate::result::strength_error::{HOLDS, of_steps, stated};
-use std::path::Path;
 
 /// Share of the target that is left to the load steps.
 const STEPS_SHARE: f64 = 0.25;
@@ -26,25 +23,25 @@ const MOST_STEPS: usize = 160;
 /// Elements a voxel along each axis, after one.
 const SPLIT: [usize; 2] = [2, 3];
 
-/// Solves the specimen in `dir` until the stated error of its strength is below `target`.
+/// All that is solved until the stated error of the strength is below `target`.
 ///
 /// # Errors
 /// As [`crate::command::solve::solve`].
-pub fn solve_to(dir: &Path, target: f64, params: &SolveParams, session: &Session) -> Result<Found> {
-    let mut scan = OpenScan::open(dir, &split_voxels(params, 1), session.force, session)?;
-    if !session.dry_run {
-        scan.results().edit_rows(ErrorTargetNote::remove_note)?;
-    }
+pub fn rows(
+    scan: &mut OpenScan,
+    target: f64,
+    params: &SolveParams,
+    session: &Session,
+) -> Result<Vec<Row>> {
     let mut climb = Climb {
-        scan: &mut scan,
+        scan,
         target,
         params,
         session,
         rows: Vec::new(),
     };
     climb.climb()?;
-    let rows = climb.rows;
-    super::finish(&mut scan, rows, target, session)
+    Ok(climb.rows)
 }
 
 struct Climb<'a> {
@@ -124,6 +121,6 @@ impl Climb<'_> {
 
     fn fits(&self, split: usize) -> Result<()> {
         let params = self.params(split, self.params.steps);
-        estimate::refuse_what_does_not_fit(&of_voxels(), self.scan.prepared(), &params)
+        of_voxels().fits(self.scan.prepared(), &params, &FreeMemory::now())
     }
 }

@@ -7,7 +7,7 @@ pub mod pattern;
 use crate::error::{Error, Result};
 use flate2::bufread::GzDecoder;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
 /// How one voxel is stored.
@@ -74,14 +74,23 @@ pub fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
 
 /// A file as a stream, its size on disk, and whether it was compressed (gzip, by its first bytes, decompressed here).
 pub fn open(path: &Path) -> Result<(Source, u64, bool)> {
-    let (mut file, file_bytes) = open_plain(path)?;
-    let compressed = file.fill_buf().is_ok_and(|start| start.starts_with(&GZIP));
-    let source: Source = if compressed {
-        Box::new(gunzip(file))
-    } else {
-        Box::new(file)
-    };
+    let (file, file_bytes) = open_plain(path)?;
+    let (source, compressed) = decompressed(file);
     Ok((source, file_bytes, compressed))
+}
+
+/// The same of the bytes of a file that was read before.
+pub fn of_bytes(bytes: Vec<u8>) -> (Source, u64, bool) {
+    let file_bytes = bytes.len() as u64;
+    let (source, compressed) = decompressed(Cursor::new(bytes));
+    (source, file_bytes, compressed)
+}
+
+fn decompressed(mut file: impl BufRead + 'static) -> (Source, bool) {
+    match file.fill_buf().is_ok_and(|start| start.starts_with(&GZIP)) {
+        true => (Box::new(gunzip(file)), true),
+        false => (Box::new(file), false),
+    }
 }
 
 /// The content of a gzip stream. Read to its end, every member is held to its checksum.

@@ -62,7 +62,7 @@ pub use header::decimal;
 pub use write::{Voxel, write, write_field, write_grey};
 
 use crate::error::{Error, Result};
-use crate::format::raw::{self, Layout, Scalar};
+use crate::format::raw::{self, Layout, Scalar, Source};
 use crate::image::stored::Stored;
 use header::{Header, Version};
 use std::ffi::OsString;
@@ -73,7 +73,18 @@ const DAMAGED: &str = "the file is damaged or is no NIfTI: export it again";
 /// Reads `.nii`, `.nii.gz`, or a pair of `.hdr` and `.img` by either name.
 pub fn read(path: &Path) -> Result<Stored> {
     let path = &header_of(path);
-    let (mut source, file_bytes, compressed) = raw::open(path)?;
+    of_source(path, raw::open(path)?)
+}
+
+/// The same of the bytes of a file that was read before; `path` names it in errors.
+pub fn of_bytes(path: &Path, bytes: Vec<u8>) -> Result<Stored> {
+    of_source(path, raw::of_bytes(bytes))
+}
+
+fn of_source(
+    path: &Path,
+    (mut source, file_bytes, compressed): (Source, u64, bool),
+) -> Result<Stored> {
     let header = header::read(&mut source, path)?;
     let layout = layout(&header, path)?;
     let offset = offset(&header, path)?;

@@ -1,5 +1,6 @@
 //! Owns the seam: what a solve needs of a three-dimensional discretisation of a specimen.
 
+pub mod memory;
 pub mod precondition;
 pub mod steps;
 pub mod yielded;
@@ -50,6 +51,20 @@ pub trait Discretisation: Sized {
     /// # Errors
     /// Settings that do not fit the specimen.
     fn cost(case: &Self::Case, params: &SolveParams, known: Known) -> Result<Cost>;
+
+    /// Bytes of a solve beyond the specimen, counted in the bone; and the model, where counting is building it, so that it is not built
+    /// again. 0 where there is nothing to solve.
+    ///
+    /// # Errors
+    /// As [`Discretisation::build`].
+    fn count(
+        case: &Self::Case,
+        prepared: Prepared,
+        params: &SolveParams,
+    ) -> Result<(f64, Option<Self>)> {
+        let [_, most] = Self::cost(case, params, Known::Bone(prepared))?.bytes;
+        Ok((most, None))
+    }
 
     /// Discretises the specimen: what carries load from support to support.
     ///
@@ -163,8 +178,6 @@ pub enum Known<'a> {
         volume_mm3: Option<f64>,
     },
     /// The bone, of which only the volume is looked at.
-    Volume(Prepared<'a>),
-    /// The bone, in which sites or nodes are counted. Takes time, and memory on lattices.
     Bone(Prepared<'a>),
 }
 

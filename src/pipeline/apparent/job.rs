@@ -3,6 +3,7 @@
 use crate::discretisation::voxels::{self, Planes};
 use crate::error::{Error, Result};
 use crate::operator::{Functional, MixedPrecision, Operator};
+use crate::pipeline::apparent::discretisation::memory::{Memory, Unlimited, counted, fitting};
 use crate::pipeline::apparent::discretisation::yielded::{Kept, NotKept};
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, Prepared, System,
@@ -34,14 +35,28 @@ pub trait Solve: Send + Sync {
     /// Settings that do not fit the specimen.
     fn cost(&self, params: &SolveParams, known: Known) -> Result<Cost>;
 
+    /// What the solve takes, its bytes counted in the bone. Takes time, and memory on lattices.
+    ///
+    /// # Errors
+    /// As [`Solve::cost`].
+    fn counted_cost(&self, prepared: Prepared, params: &SolveParams) -> Result<Cost>;
+
+    /// Refuses a solve that `memory` does not hold.
+    ///
+    /// # Errors
+    /// Such a solve, settings that do not fit the specimen.
+    fn fits(&self, prepared: Prepared, params: &SolveParams, memory: &dyn Memory) -> Result<()>;
+
     /// Discretises and solves; load steps are kept in `kept`.
     ///
     /// # Errors
-    /// Settings that do not fit the specimen, steps that cannot be kept. Not converging is no error: the solution says so.
+    /// Settings that do not fit the specimen, a solve that `memory` does not hold, steps that cannot be kept. Not converging is no
+    /// error: the solution says so.
     fn solve(
         &self,
         prepared: Prepared,
         params: &SolveParams,
+        memory: &dyn Memory,
         kept: &mut dyn Kept,
         observe: &mut Observe,
     ) -> Result<JobResult>;
@@ -82,7 +97,8 @@ impl Job {
     ) -> Result<JobResult> {
         params.check()?;
         let tissue = &Tissue::of(specimen, params)?;
-        self.solve(Prepared { specimen, tissue }, params, &mut NotKept, observe)
+        let prepared = Prepared { specimen, tissue };
+        self.solve(prepared, params, &Unlimited, &mut NotKept, observe)
     }
 }
 
@@ -115,18 +131,29 @@ impl<D: Discretisation> Solve for Of<D> {
         D::cost(&self.0, params, known)
     }
 
+    fn counted_cost(&self, prepared: Prepared, params: &SolveParams) -> Result<Cost> {
+        Ok(counted::<D>(&self.0, prepared, params)?.0)
+    }
+
+    fn fits(&self, prepared: Prepared, params: &SolveParams, memory: &dyn Memory) -> Result<()> {
+        fitting::<D>(&self.0, prepared, params, memory).map(drop)
+    }
+
     fn solve(
         &self,
         prepared: Prepared,
         params: &SolveParams,
+        memory: &dyn Memory,
         kept: &mut dyn Kept,
         observe: &mut Observe,
     ) -> Result<JobResult> {
+        let counted = fitting::<D>(&self.0, prepared, params, memory)?;
+        let build = || counted.map_or_else(|| D::build(&self.0, prepared, params), Ok);
         if params.load == Load::Stiffness {
-            let solved = stiffness::<D>(&self.0, prepared, params, observe)?;
+            let solved = stiffness(build, prepared.specimen, params, observe)?;
             return Ok(JobResult::Stiffness(solved));
         }
-        let model = D::build(&self.0, prepared, params)?;
+        let model = build()?;
         let system = model.system(LoadSet::Ends);
         if system.sites == 0 {
             let no_answer = bone_connects(prepared.specimen, params);
@@ -214,5 +241,57 @@ fn count_mechanisms<O: MixedPrecision, C, G: Functional<3>>(
             mechanisms(system.operator, &system.held, &places.at, places.reach).map(Some)
         }
         None => Ok(None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Grid;
+    use crate::pipeline::apparent::of_lattice;
+    use crate::pipeline::lattice::{Boundary, Case, PLACED, Structure};
+    use crate::volume::Volume;
+
+    /// Memory that may not do, so that everything is counted first.
+    struct InQuestion;
+
+    impl Memory for InQuestion {
+        fn surely_holds(&self, _: f64) -> bool {
+            false
+        }
+
+        fn refuse(&self, cost: &Cost) -> Result<()> {
+            assert!(cost.bytes[0] > 0.0);
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_lattice_that_is_counted_first_is_not_built_again() {
+        let grid = Grid::new([12; 3], [0.05; 3]);
+        let specimen = &Specimen {
+            name: "block".into(),
+            bone: Volume::from_vec(grid, vec![1; grid.len()]),
+            tv_mm3: grid.size_mm().iter().product(),
+            tv_definition: "box".into(),
+            grey: None,
+            threshold: None,
+        };
+        let params = SolveParams::default();
+        let tissue = &Tissue::of(specimen, &params).unwrap();
+        for boundary in [Boundary::Firm, Boundary::Connected] {
+            let job = of_lattice(Case {
+                structure: Structure::Sc,
+                lp_mm: 0.1,
+                boundary,
+                registration_mm: [0.0; 3],
+            });
+            PLACED.set(0);
+            let prepared = Prepared { specimen, tissue };
+            let solved = job.solve(prepared, &params, &InQuestion, &mut NotKept, &mut |_, _| {});
+            let (solved, _) = solved.unwrap().modulus().unwrap();
+            assert!(solved.moduli.e_app_mpa > 0.0);
+            assert_eq!(PLACED.get(), 1, "{boundary:?}");
+        }
     }
 }

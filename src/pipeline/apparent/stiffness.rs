@@ -4,9 +4,7 @@ use crate::error::{Error, Result};
 use crate::measure::stiffness::Six;
 use crate::operator::MixedPrecision;
 use crate::par::{CHUNK, dot, sum_chunks};
-use crate::pipeline::apparent::discretisation::{
-    Discretisation, Displacements, LoadSet, Prepared, System,
-};
+use crate::pipeline::apparent::discretisation::{Discretisation, Displacements, LoadSet, System};
 use crate::pipeline::apparent::equilibrium::{Observe, equilibrium};
 use crate::pipeline::apparent::params::{Conditions, SolveParams};
 use crate::solver::cg::{CgInfo, Ended};
@@ -48,13 +46,13 @@ pub struct Stiffness {
 /// # Errors
 /// A volume of interest that is no box, a discretisation without faces, too many nodes.
 pub fn stiffness<D: Discretisation>(
-    case: &D::Case,
-    prepared: Prepared,
+    build: impl FnOnce() -> Result<D>,
+    specimen: &Specimen,
     params: &SolveParams,
     observe: &mut Observe,
 ) -> Result<Stiffness> {
-    let volume = box_mm3(prepared.specimen)?;
-    let model = D::build(case, prepared, params)?;
+    let volume = box_mm3(specimen)?;
+    let model = build()?;
     let mut products = Products::new(params.conditions);
     let mut sum = Stiffness::none();
     for &loads in groups(params.conditions) {

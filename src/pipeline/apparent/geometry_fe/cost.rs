@@ -32,7 +32,7 @@ pub fn of(params: &SolveParams, known: Known) -> Cost {
             let vertices = 2.0 * voxels / cell;
             cost(elements, vertices, voxels, params.element_mm.unwrap_or(0.0))
         }
-        Known::Volume(prepared) | Known::Bone(prepared) => of_bone(params, prepared),
+        Known::Bone(prepared) => of_bone(params, prepared),
     }
 }
 

@@ -56,10 +56,14 @@ impl Discretisation for ConnectedModel {
         label(key, case)
     }
 
-    fn cost(case: &Case, params: &SolveParams, known: Known) -> Result<Cost> {
-        cost::of(case, known, |prepared| {
-            cost::of_components(case, prepared, params)
-        })
+    fn cost(case: &Case, _: &SolveParams, known: Known) -> Result<Cost> {
+        Ok(cost::of(case, known))
+    }
+
+    fn count(case: &Case, prepared: Prepared, params: &SolveParams) -> Result<(f64, Option<Self>)> {
+        let model = Self::build(case, prepared, params)?;
+        let bytes = cost::of_components(&model.lattice.sites);
+        Ok((bytes, Some(model)))
     }
 
     fn build(case: &Case, prepared: Prepared, params: &SolveParams) -> Result<Self> {

@@ -4,12 +4,11 @@
 //! factors are fits to the program's own peaks, within 15 % on twelve lattices of all kinds (`cargo bench --bench memory`
 //! prints peaks and estimates, `cargo test --release -- --ignored memory_is` holds eight whole commands to them).
 
+use crate::discretisation::lattice::connected::ConnectedSites;
 use crate::discretisation::lattice::sites::Sites;
-use crate::error::Result;
-use crate::pipeline::apparent::discretisation::{ASSUMED_BONE, Cost, Known, Prepared, Resolution};
-use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::discretisation::{ASSUMED_BONE, Cost, Known, Resolution};
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::lattice::{Boundary, Case, build_connected, build_of};
+use crate::pipeline::lattice::{Boundary, Case};
 use crate::solver::amg::AmgParams;
 use crate::volume::Specimen;
 use std::collections::HashSet;
@@ -33,24 +32,23 @@ const MOST_PER_SITE: f64 = 430.0;
 /// Seconds per site on two cores: 0.55 s for 120 096 sites.
 const S_PER_SITE: f64 = 5e-6;
 
-/// What a solve takes; `count` yields its bytes from the bone.
-pub fn of(case: &Case, known: Known, count: impl FnOnce(Prepared) -> Result<f64>) -> Result<Cost> {
+/// What a solve takes.
+pub fn of(case: &Case, known: Known) -> Cost {
     let cell_mm3 = case.structure.cell_volume() * case.lp_mm.powi(3);
     let volume_mm3 = match known {
         Known::Header { volume_mm3, .. } => volume_mm3,
-        Known::Volume(p) | Known::Bone(p) => Some(p.specimen.bone.grid.size_mm().iter().product()),
+        Known::Bone(p) => Some(p.specimen.bone.grid.size_mm().iter().product()),
     };
     let sites = volume_mm3.map(|volume| ASSUMED_BONE * volume / cell_mm3);
     let bytes = match known {
         Known::Header { .. } => [sites.unwrap_or(0.0) * BYTES_PER_SITE; 2],
-        Known::Volume(prepared) => bounds(prepared.specimen, case),
-        Known::Bone(prepared) => [count(prepared)?; 2],
+        Known::Bone(prepared) => bounds(prepared.specimen, case),
     };
-    Ok(Cost {
+    Cost {
         bytes,
         time_s: sites.map(|sites| sites * S_PER_SITE),
         resolution: Resolution::LatticeParameter(case.lp_mm),
-    })
+    }
 }
 
 /// Bytes at the least and at the most, without building the lattice.
@@ -70,14 +68,8 @@ fn bounds(specimen: &Specimen, case: &Case) -> [f64; 2] {
     ]
 }
 
-/// Bytes of a lattice of sites, counted.
-pub fn of_sites(case: &Case, prepared: Prepared, params: &SolveParams) -> Result<f64> {
-    let Prepared { specimen, tissue } = prepared;
-    let factors = match tissue {
-        Tissue::Uniform(_) => None,
-        Tissue::Mixed(mixed) => Some(&mixed.factor[..]),
-    };
-    let sites = build_of(specimen, factors, case, params.axis, params.grip_mm)?;
+/// Bytes of the solve of a lattice of sites in this tissue.
+pub fn of_sites(sites: &Sites, tissue: &Tissue) -> f64 {
     let mut site = SITE;
     if sites.weights.is_some() {
         site += WEIGHTED;
@@ -85,13 +77,12 @@ pub fn of_sites(case: &Case, prepared: Prepared, params: &SolveParams) -> Result
     if matches!(tissue, Tissue::Mixed(mixed) if mixed.poissons.len() > 1) {
         site += WEIGHTED;
     }
-    Ok(sites.len() as f64 * site + boxes(&sites) as f64 * SITE_BOX)
+    sites.len() as f64 * site + boxes(sites) as f64 * SITE_BOX
 }
 
-/// Bytes of a lattice of connected components, counted.
-pub fn of_components(case: &Case, prepared: Prepared, params: &SolveParams) -> Result<f64> {
-    let sites = build_connected(prepared.specimen, case, params.axis, params.grip_mm)?;
-    Ok(sites.len() as f64 * COMPONENT)
+/// Bytes of the solve of a lattice of connected components.
+pub fn of_components(sites: &ConnectedSites) -> f64 {
+    sites.len() as f64 * COMPONENT
 }
 
 /// Multigrid's boxes that hold sites.

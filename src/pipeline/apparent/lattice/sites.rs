@@ -62,10 +62,14 @@ impl Discretisation for SiteModel {
         label(key, case)
     }
 
-    fn cost(case: &Case, params: &SolveParams, known: Known) -> Result<Cost> {
-        cost::of(case, known, |prepared| {
-            cost::of_sites(case, prepared, params)
-        })
+    fn cost(case: &Case, _: &SolveParams, known: Known) -> Result<Cost> {
+        Ok(cost::of(case, known))
+    }
+
+    fn count(case: &Case, prepared: Prepared, params: &SolveParams) -> Result<(f64, Option<Self>)> {
+        let model = Self::build(case, prepared, params)?;
+        let bytes = cost::of_sites(&model.lattice.sites, prepared.tissue);
+        Ok((bytes, Some(model)))
     }
 
     fn build(case: &Case, prepared: Prepared, params: &SolveParams) -> Result<Self> {

@@ -37,7 +37,7 @@ pub fn of(params: &SolveParams, known: Known) -> Cost {
     let per_voxel = (params.refine as f64 / params.coarsen as f64).powi(3);
     let voxels = match known {
         Known::Header { voxels, .. } => ASSUMED_BONE * voxels,
-        Known::Volume(Prepared { specimen, .. }) | Known::Bone(Prepared { specimen, .. }) => {
+        Known::Bone(Prepared { specimen, .. }) => {
             specimen.bv_mm3() / specimen.bone.grid.voxel_mm3()
         }
     };
@@ -45,8 +45,7 @@ pub fn of(params: &SolveParams, known: Known) -> Cost {
     let elements = voxels * per_voxel;
     let bytes = match known {
         Known::Header { .. } => [elements * BYTES_PER_ELEMENT; 2],
-        Known::Volume(_) => [0.0, elements * BYTES_PER_ELEMENT],
-        Known::Bone(Prepared { specimen, .. }) => [counted(specimen, params); 2],
+        Known::Bone(_) => [0.0, elements * BYTES_PER_ELEMENT],
     };
     Cost {
         bytes,
@@ -59,7 +58,7 @@ pub fn of(params: &SolveParams, known: Known) -> Cost {
 }
 
 /// Bytes of a solve beyond the specimen, at their highest; 0 where there is nothing to solve.
-fn counted(specimen: &Specimen, params: &SolveParams) -> f64 {
+pub fn counted(specimen: &Specimen, params: &SolveParams) -> f64 {
     let grid = &specimen.bone.grid;
     let by_fraction = params.coarsen > 1 && params.coarsen_by == CoarsenBy::Fraction;
     let differing = by_fraction || params.material.is_some();

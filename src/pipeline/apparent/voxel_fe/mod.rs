@@ -121,6 +121,10 @@ impl Discretisation for VoxelModel {
         Ok(cost::of(params, known))
     }
 
+    fn count(_: &(), prepared: Prepared, params: &SolveParams) -> Result<(f64, Option<Self>)> {
+        Ok((cost::counted(prepared.specimen, params), None))
+    }
+
     fn build(_: &(), prepared: Prepared, params: &SolveParams) -> Result<Self> {
         let keep = Keep::under(params.load);
         let Some(resolved) = resolution::resolved(prepared.specimen, params)? else {

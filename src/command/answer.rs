@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::io::own_files::RESULTS;
 use crate::io::table;
-use crate::record::answer::{self, Answer};
+use crate::record::answer;
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
 use crate::result::answer::{AnswerLine, ScanFacts, answers};
@@ -28,13 +28,13 @@ fn of_record(record: &SegmentRecord) -> ScanFacts {
     }
 }
 
-/// Writes `answer.json` after one command solved `rows` in `dir`: of all rows there under their condition. None, and nothing is
-/// written, where no row has a modulus, force or moment. `target` is the relative error asked for; without one, that of an earlier command
+/// Writes `answer.json` after one command solved `rows` in `dir`: of all rows there under their condition. The line of that answer;
+/// None, and nothing is written, where no row has a modulus, force or moment. `target` is the relative error asked for; without one, that of an earlier command
 /// under the same condition holds.
 ///
 /// # Errors
 /// A file that cannot be read or written.
-pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answer>> {
+pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<AnswerLine>> {
     let Some(condition) = condition(rows) else {
         return Ok(None);
     };
@@ -45,11 +45,10 @@ pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answ
         }
     }
     let known = known(dir, rows, &condition)?;
-    let answer = answer::answer(&known, &facts);
-    if let Some(answer) = &answer {
-        answer::write(dir, answer)?;
+    if let Some(answer) = answer::answer(&known, &facts) {
+        answer::write(dir, &answer)?;
     }
-    Ok(answer)
+    Ok(answers(&known, &condition, |_| facts.clone()).pop())
 }
 
 /// The answer of the scan in `dir` under the condition of `rows`, which one command solved there.

@@ -218,6 +218,7 @@ fn by_format(path: &Path, raw: Option<Contents>) -> Result<Stored> {
             format!("cannot be read: {e}"),
             "check the path and its permissions",
         )
+        .caused_by(e)
     })?;
     if meta.is_dir() {
         return slices::read(path);
@@ -407,6 +408,7 @@ fn hash_file(path: &Path) -> Result<blake3::Hash> {
                 format!("cannot be read: {e}"),
                 "check the path and its permissions",
             )
+            .caused_by(e)
         })
 }
 

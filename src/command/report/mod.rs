@@ -206,20 +206,32 @@ fn folder(scan: &str, dirs: &[PathBuf]) -> Option<(PathBuf, SegmentRecord)> {
         .find(|(_, record)| record.scan == scan)
 }
 
-/// Scans whose masks are one, voxel by voxel: the same specimen, counted twice.
-fn same_masks(rows: &[Row], dirs: &[PathBuf]) -> Vec<String> {
-    let mut seen: Vec<(String, Vec<String>)> = Vec::new();
+/// Scans by what `key` says of their folder, each in the order of its first row. Scans that it says nothing of are left out.
+fn scans_by(
+    rows: &[Row],
+    dirs: &[PathBuf],
+    key: impl Fn(&Path, &SegmentRecord) -> Option<String>,
+) -> Vec<(String, Vec<String>)> {
+    let mut found: Vec<(String, Vec<String>)> = Vec::new();
     for page in pages(rows, &[]) {
-        let mask = folder(&page.scan, dirs).map(|(dir, _)| dir.join(specimen::MASK));
-        let Some(hash) = mask.and_then(|mask| scan::hash(&mask).ok()) else {
+        let Some(key) = folder(&page.scan, dirs).and_then(|(dir, record)| key(&dir, &record))
+        else {
             continue;
         };
-        match seen.iter_mut().find(|(known, _)| *known == hash) {
+        match found.iter_mut().find(|(known, _)| *known == key) {
             Some((_, scans)) => scans.push(page.scan),
-            None => seen.push((hash, vec![page.scan])),
+            None => found.push((key, vec![page.scan])),
         }
     }
-    let twice = seen.into_iter().filter(|(_, scans)| scans.len() > 1);
+    found
+}
+
+/// Scans whose masks are one, voxel by voxel: the same specimen, counted twice.
+fn same_masks(rows: &[Row], dirs: &[PathBuf]) -> Vec<String> {
+    let masks = scans_by(rows, dirs, |dir, _| {
+        scan::hash(&dir.join(specimen::MASK)).ok()
+    });
+    let twice = masks.into_iter().filter(|(_, scans)| scans.len() > 1);
     twice
         .map(|(_, scans)| {
             format!(
@@ -233,19 +245,11 @@ fn same_masks(rows: &[Row], dirs: &[PathBuf]) -> Vec<String> {
 
 /// Says so where a threshold was given and scans differ in it.
 fn unlike_thresholds(rows: &[Row], dirs: &[PathBuf]) -> Option<String> {
-    let mut found: Vec<(String, Vec<String>)> = Vec::new();
-    for page in pages(rows, &[]) {
-        let Some((_, record)) = folder(&page.scan, dirs).filter(|(_, r)| !r.settings.otsu) else {
-            continue;
-        };
-        let Some(lower) = record.results.lower.map(|lower| lower.to_string()) else {
-            continue;
-        };
-        match found.iter_mut().find(|(known, _)| *known == lower) {
-            Some((_, scans)) => scans.push(page.scan),
-            None => found.push((lower, vec![page.scan])),
-        }
-    }
+    let given = |_: &Path, record: &SegmentRecord| {
+        let lower = record.results.lower.filter(|_| !record.settings.otsu);
+        lower.map(|lower| lower.to_string())
+    };
+    let found = scans_by(rows, dirs, given);
     let words: Vec<String> = found
         .iter()
         .map(|(lower, scans)| format!("{lower}: {}", scans.join(", ")))

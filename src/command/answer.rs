@@ -29,8 +29,8 @@ fn of_record(record: &SegmentRecord) -> ScanFacts {
 }
 
 /// Writes `answer.json` after one command solved `rows` in `dir`: of all rows there under their condition. The line of that answer;
-/// None, and nothing is written, where no row has a modulus, force or moment. `target` is the relative error asked for; without one, that of an earlier command
-/// under the same condition holds.
+/// None, and nothing is written, where no row has a modulus, force or moment. `target` is the relative error asked for; without
+/// one, that of an earlier command under the same condition holds.
 ///
 /// # Errors
 /// A file that cannot be read or written.
@@ -49,18 +49,6 @@ pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answ
         answer::write(dir, &answer)?;
     }
     Ok(answers(&known, &condition, |_| facts.clone()).pop())
-}
-
-/// The answer of the scan in `dir` under the condition of `rows`, which one command solved there.
-///
-/// # Errors
-/// A table that cannot be read.
-pub fn line(dir: &Path, rows: &[Row]) -> Result<Option<AnswerLine>> {
-    let Some(condition) = condition(rows) else {
-        return Ok(None);
-    };
-    let known = known(dir, rows, &condition)?;
-    Ok(answers(&known, &condition, |_| facts(dir)).pop())
 }
 
 /// The condition that the answer is of: of several one with a modulus, then the last.

@@ -241,14 +241,15 @@ impl Run<'_> {
         } else {
             let recipe = self.write_recipe()?;
             let dirs = [self.out.to_path_buf()];
-            let answers = report::answers(&rows, &dirs);
+            let folders = &report::Folders::of(&rows, &dirs);
+            let answers = report::answers(&rows, folders);
             table::write(&self.out.join(own_files::ANSWERS), &answers.lines)?;
             let sources = report::Sources {
                 rows: &rows,
                 answers,
                 failures: &failures,
                 params: &self.recipe.report,
-                dirs: &dirs,
+                folders,
                 recipe: Some(recipe),
             };
             report::write(sources, &self.out.join("report"), self.session)?;

@@ -11,20 +11,13 @@ use crate::result::condition::{Condition, shared};
 use crate::result::row::Row;
 use std::path::Path;
 
-/// What segmentation and the solves so far in `dir` left.
-pub fn facts(dir: &Path) -> ScanFacts {
-    ScanFacts {
-        targets: answer::targets(dir),
-        ..specimen::record(dir).map_or_else(ScanFacts::default, |record| of_record(&record))
-    }
-}
-
-fn of_record(record: &SegmentRecord) -> ScanFacts {
+/// What segmentation, as its record says, and the solves so far in `dir` left.
+pub fn facts(dir: &Path, record: &SegmentRecord) -> ScanFacts {
     let results = &record.results;
     ScanFacts {
+        targets: answer::targets(dir),
         size_mm: Some([0, 1, 2].map(|a| results.voxels[a] as f64 * results.spacing_mm[a])),
         warnings: results.warnings.clone(),
-        ..ScanFacts::default()
     }
 }
 
@@ -38,7 +31,8 @@ pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answ
     let Some(condition) = condition(rows) else {
         return Ok(None);
     };
-    let mut facts = facts(dir);
+    let of_record = |record: SegmentRecord| facts(dir, &record);
+    let mut facts = specimen::record(dir).map_or_else(ScanFacts::default, of_record);
     if let Some(target) = target {
         for row in rows {
             facts.targets.set(&Condition::of(&row.key), target);

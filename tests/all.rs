@@ -12,6 +12,7 @@ mod apparent;
 mod cli;
 mod cohort;
 mod dicom_series;
+mod earlier_version;
 mod examples;
 mod exports;
 mod extension;

@@ -65,15 +65,22 @@ pub fn keep_other_version(dir: &Path, session: &Session) {
     if version.as_deref() == Some(env!("CARGO_PKG_VERSION")) {
         return;
     }
-    // Of a record that cannot be read, or of none, only this is known.
-    let version = version.unwrap_or_else(|| "other".to_owned());
-    let kept = format!("results-{version}.csv");
+    let (made_by, kept) = match version {
+        Some(version) => (
+            format!("version {version} of the program"),
+            format!("results-{version}.csv"),
+        ),
+        // Of a record that cannot be read, or of none.
+        None => (
+            "another program".to_owned(),
+            "results-other.csv".to_owned(),
+        ),
+    };
     details::remove(dir);
     if std::fs::rename(&table, dir.join(&kept)).is_ok() {
         session.say(format!(
-            "{}: the results there are not of version {} of the program ({version}): they are kept as {kept}",
-            dir.display(),
-            env!("CARGO_PKG_VERSION"),
+            "{}: {made_by} made the results there: they are kept as {kept}",
+            dir.display()
         ));
     }
 }

@@ -15,11 +15,8 @@ pub enum End {
 impl End {
     /// The end that a place belongs to: up to `low` or from `high` on.
     pub fn at<T: PartialOrd>(place: T, low: T, high: T) -> Option<End> {
-        match place {
-            _ if place <= low => Some(End::Lower),
-            _ if place >= high => Some(End::Upper),
-            _ => None,
-        }
+        let lower = (place <= low).then_some(End::Lower);
+        lower.or((place >= high).then_some(End::Upper))
     }
 
     /// The word of `reactions.csv`.

@@ -159,7 +159,7 @@ class Workflow:
 
     def start(self, *more):
         self.starts += 1
-        # Without a database sacct knows nothing; without a second to lose jobs are looked at often.
+        # Without a database sacct knows nothing. Jobs are short, so they are looked at often.
         command = [SNAKEMAKE, "-s", ROOT / "pipelines/Snakefile", "--profile", ROOT / "pipelines/slurm", "--slurm-status-command", "squeue",
                    "--slurm-init-seconds-before-status-checks", "5", *more,
                    "--config", f"program={PROGRAM}", f"recipe={RECIPE}", "inputs=scans", "out=out", "threads=1"]
@@ -231,7 +231,7 @@ def check(folder, cluster):
 
     before = {scan: (folder / f"out/scans/{scan}/results.csv").stat().st_mtime_ns for scan in kept}
     assert flow.start("--unlock").wait() == 0, flow.log().read_text()
-    run = flow.start("--rerun-incomplete")
+    run = flow.start()
     assert run.wait(PATIENCE_S) == 0, flow.log().read_text()
     untouched = {scan for scan in kept if (folder / f"out/scans/{scan}/results.csv").stat().st_mtime_ns == before[scan]}
     say(start, f"resumed and finished; not run again: {', '.join(sorted(untouched))}")

@@ -47,7 +47,11 @@ fn rows(scan: &str, out: &Path, is_portable: bool) -> Vec<Row> {
         is_portable,
     );
     for way in WAYS {
-        let solve = [&["solve", folder, "--tolerance", TOLERANCE, "--quiet"], way].concat();
+        let solve = [
+            &["solve", folder, "--tolerance", TOLERANCE, "--quiet"][..],
+            way,
+        ]
+        .concat();
         words(&solve, is_portable);
     }
     table::read(&out.join("results.csv")).unwrap()
@@ -66,7 +70,7 @@ fn plain_arrays_give_the_moduli_of_vector_registers() {
         "--bvtv",
         "0.35",
     ];
-    let (code, _, stderr) = run(&[&["phantom", "-o", scan], &size[..]].concat());
+    let (code, _, stderr) = run(&[&["phantom", "-o", scan][..], &size].concat());
     assert_eq!(code, 0, "{stderr}");
     let fast = rows(scan, &dir.path().join("fast"), false);
     let plain = rows(scan, &dir.path().join("plain"), true);
@@ -78,9 +82,9 @@ fn plain_arrays_give_the_moduli_of_vector_registers() {
         let (Some(e), Some(plain)) = (a.e_app_mpa(), b.e_app_mpa()) else {
             panic!("no modulus of {:?}", a.key)
         };
-        // A hundred times what both solves allow themselves.
+        // What both solves allow themselves; measured without AVX: 2e-11 at most.
         assert!(
-            (e / plain - 1.0).abs() < 1e-6,
+            (e / plain - 1.0).abs() < 1e-8,
             "{:?}: {e}, plain {plain}",
             a.key
         );
@@ -93,37 +97,20 @@ fn plain_arrays_give_the_moduli_of_vector_registers() {
     );
 }
 
-/// Bond forces of a scene that grows for 80 steps.
+/// Bond forces of a scene that grows for 80 steps: one text of the program for all registers, without fused products, so to the bit.
 #[test]
 fn a_scene_remodels_alike() {
     let dir = tempfile::tempdir().unwrap();
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/square-fixed-ratio-10.toml");
     let history = |name: &str, is_portable: bool| {
-        let out = dir.path().join(name);
+        let (scene, out) = (scene.to_str().unwrap(), dir.path().join(name));
         words(
-            &[
-                "scene",
-                scene.to_str().unwrap(),
-                "-o",
-                out.to_str().unwrap(),
-                "--quiet",
-            ],
+            &["scene", scene, "-o", out.to_str().unwrap(), "--quiet"],
             is_portable,
         );
         std::fs::read_to_string(out.join("history.csv")).unwrap()
     };
-    let (fast, plain) = (history("fast", false), history("plain", true));
-    assert_eq!(fast.lines().next(), plain.lines().next());
-    assert_eq!(fast.lines().count(), plain.lines().count());
-    let numbers = |text: &str| -> Vec<f64> {
-        let cells = text.lines().skip(1).flat_map(|line| line.split(','));
-        cells.filter_map(|cell| cell.parse().ok()).collect()
-    };
-    let (fast, plain) = (numbers(&fast), numbers(&plain));
-    assert!(fast.len() > 100, "{} numbers", fast.len());
-    let largest = fast.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    for (a, b) in fast.iter().zip(&plain) {
-        // Each step is solved to a share of its forces; rounding of 1e-16 grows over the steps.
-        assert!((a - b).abs() < 1e-6 * largest, "{a}, plain {b}");
-    }
+    let fast = history("fast", false);
+    assert_eq!(fast, history("plain", true));
+    assert!(fast.lines().count() > 80);
 }

@@ -28,27 +28,28 @@ AXES = "xyz"
 
 
 def specimen(folder):
-    """Mask (x, y, z), voxel size in mm, TV in mm³."""
-    record = json.loads((folder / "segment.json").read_text())["results"]
+    """Mask (x, y, z), voxel size in mm, TV in mm³, and whether the scan was segmented by labels."""
+    whole = json.loads((folder / "segment.json").read_text())
+    record = whole["results"]
     mask = numpy.asarray(nibabel.load(folder / "mask.nii.gz").dataobj) > 0
     spacing = record["spacing_mm"]
     if max(spacing) / min(spacing) - 1 > 1e-3:
         sys.exit(f"{folder}: ParOSol's voxels are cubes, these are {spacing} mm: resample the scan first")
     if max(mask.shape) > 32766:
         sys.exit(f"{folder}: {mask.shape} voxels, ParOSol counts to 32767 a side: crop the scan first")
-    return mask, float(numpy.mean(spacing)), record["tv_mm3"]
+    return mask, float(numpy.mean(spacing)), record["tv_mm3"], bool(whole["settings"]["labels"])
 
 
-def moduli(arguments, mask):
+def moduli(arguments, mask, labelled):
     """Young's modulus in MPa by voxel, 0 in pores."""
     grey = arguments.dir / "grey.nii.gz"
     if arguments.labels is None:
-        if grey.exists() and not arguments.one_tissue:
-            sys.exit(f"{arguments.dir}: keeps the scan's values, so that tissue may differ from voxel to voxel: give --labels VALUE=E,… "
+        if labelled and not arguments.one_tissue:
+            sys.exit(f"{arguments.dir}: is segmented by labels, so that tissue may differ from voxel to voxel: give --labels VALUE=E,… "
                      "(of other laws ParOSol knows none; `bonepd-ct solve --export inp` writes them), or --one-tissue to take "
                      f"{arguments.young_mpa} MPa everywhere")
         return mask * arguments.young_mpa
-    if not grey.exists():
+    if not labelled or not grey.exists():
         sys.exit(f"{arguments.dir}: holds no labels: run `bonepd-ct segment` with --labels, or leave --labels out here")
     values = numpy.asarray(nibabel.load(grey).dataobj)
     young = numpy.zeros(mask.shape)
@@ -96,8 +97,8 @@ def held(mask, axis, ends, displacement):
 
 
 def export(arguments):
-    mask, h, _ = specimen(arguments.dir)
-    young = moduli(arguments, mask)
+    mask, h, _, labelled = specimen(arguments.dir)
+    young = moduli(arguments, mask, labelled)
     axis = AXES.index(arguments.axis)
     length = mask.shape[axis] * h
     coordinates, values = held(mask, axis, arguments.ends, arguments.strain * length)
@@ -119,7 +120,7 @@ def export(arguments):
 
 
 def read(arguments):
-    mask, h, tv = specimen(arguments.dir)
+    mask, h, tv, _ = specimen(arguments.dir)
     with h5py.File(arguments.model) as file:
         if "Solution" not in file:
             sys.exit(f"{arguments.model}: no /Solution: run ParOSol on it first")

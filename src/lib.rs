@@ -54,7 +54,7 @@
 //!
 //! | layer | module | owns |
 //! |---|---|---|
-//! | 0 | [`error`], [`par`], [`parts`], [`simd`] | messages to the person at the keyboard; vector sums that repeat on any number of threads; which numbers belong together; eight lanes chosen at run time |
+//! | 0 | [`error`], [`par`], [`parts`], [`simd`], [`system`] | messages to the person at the keyboard; vector sums that repeat on any number of threads; which numbers belong together; eight lanes chosen at run time; what differs between operating systems |
 //! | 1 | [`grid`] | indices, voxels, millimetres |
 //! | 2 | [`volume`], [`io`] | values on a grid and the segmented specimen; files written whole, tables |
 //! | 3 | [`format`](mod@crate::format), [`mask`] | what file formats share: raw voxels, lengths, orientation, calibration; turning and resampling, smoothing, thresholds, volumes of interest, connected components |
@@ -110,4 +110,6 @@ pub mod scene;
 pub mod simd;
 #[doc(hidden)]
 pub mod solver;
+#[doc(hidden)]
+pub mod system;
 pub mod volume;

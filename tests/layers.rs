@@ -10,6 +10,7 @@ const LAYERS: [(&str, u32); 26] = [
     ("par", 0),
     ("parts", 0),
     ("simd", 0),
+    ("system", 0),
     ("grid", 1),
     ("volume", 2),
     ("io", 2),
@@ -341,6 +342,41 @@ fn the_table_is_the_one_in_the_crates_root() {
         .filter(|line| line.starts_with("pub mod "))
         .count();
     assert_eq!(declared, LAYERS.len());
+}
+
+/// Words of one operating system. Instruction sets (`target_arch`) are no such words.
+const OF_ONE_SYSTEM: [&str; 10] = [
+    "libc::",
+    "std::os::",
+    "/proc/",
+    "/sys/",
+    "/dev/",
+    "cfg(unix",
+    "cfg!(unix",
+    "cfg(windows",
+    "target_os",
+    "target_vendor",
+];
+
+/// Unit tests aside: `code` up to the first of them.
+fn of_one_system(code: &str) -> Option<&'static str> {
+    let end = code.find("#[cfg(test)]\nmod tests").unwrap_or(code.len());
+    OF_ONE_SYSTEM
+        .into_iter()
+        .find(|word| code[..end].contains(word))
+}
+
+#[test]
+fn what_differs_between_systems_stands_in_one_file() {
+    for module in modules() {
+        let found = of_one_system(&module.code);
+        match module.path[0].as_str() {
+            "system" => assert!(found.is_some()),
+            _ => assert_eq!(found, None, "{}", module.path.join("/")),
+        }
+    }
+    assert_eq!(of_one_system("let x = cfg!(unix);"), Some("cfg!(unix"));
+    assert_eq!(of_one_system("#[cfg(test)]\nmod tests { libc::x }"), None);
 }
 
 #[test]

@@ -5,6 +5,7 @@
 use crate::cohort::job::ScanJob;
 use crate::error::{Error, Result};
 use crate::image::scan;
+use crate::io::named;
 use crate::pipeline::segment::SegmentParams;
 use std::path::Path;
 
@@ -188,7 +189,7 @@ fn job<'a>(
         let word = cell(column);
         word.map(|word| parsed(word, column, delimiter)).transpose()
     };
-    let input = folder.join(cell("path").ok_or("no path")?);
+    let input = named::beside(folder, cell("path").ok_or("no path")?);
     let mut segment = params.clone();
     let (lower, upper) = (number("lower")?, number("upper")?);
     if lower.is_some() || upper.is_some() {

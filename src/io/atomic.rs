@@ -3,6 +3,7 @@
 //! holding its lock: [`sweep`] clears it away.
 
 use crate::error::{Error, Result};
+use crate::system;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use tempfile::NamedTempFile;
@@ -68,7 +69,7 @@ fn temporary(dir: &Path) -> std::io::Result<NamedTempFile> {
         let mut builder = tempfile::Builder::new();
         let file = builder.prefix(PREFIX).tempfile_in(dir)?;
         // File systems without locks also refuse them to `sweep`.
-        if cfg!(unix) {
+        if system::LOCKS_ADVISE {
             let _ = file.as_file().lock();
         }
         // Swept before it was locked: another.
@@ -83,7 +84,7 @@ pub fn sweep(dir: &Path) {
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let left = entries.filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX));
     for path in left.map(|entry| entry.path()) {
-        if cfg!(unix)
+        if system::LOCKS_ADVISE
             && let Ok(file) = std::fs::File::open(&path)
             && file.try_lock().is_ok()
         {
@@ -94,36 +95,9 @@ pub fn sweep(dir: &Path) {
 
 /// Syncs a finished temporary file (of the same folder) and gives it its name.
 fn persist(file: NamedTempFile, path: &Path) -> std::io::Result<()> {
-    readable_by_all(file.as_file())?;
+    system::readable_by_all(file.as_file())?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
-    Ok(())
-}
-
-/// Temporary files are private (0600); results get what a plain `create` would have given: 0666 less the umask.
-#[cfg(unix)]
-fn readable_by_all(file: &std::fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    use std::sync::OnceLock;
-    static UMASK: OnceLock<u32> = OnceLock::new();
-    let umask = *UMASK.get_or_init(read_umask);
-    file.set_permissions(std::fs::Permissions::from_mode(0o666 & !umask))
-}
-
-/// The process's umask. Linux reports it in /proc; elsewhere it can only be read by setting it, so the usual 022 is assumed.
-#[cfg(unix)]
-fn read_umask() -> u32 {
-    std::fs::read_to_string("/proc/self/status")
-        .ok()
-        .and_then(|s| {
-            let line = s.lines().find_map(|l| l.strip_prefix("Umask:"))?;
-            u32::from_str_radix(line.trim(), 8).ok()
-        })
-        .unwrap_or(0o022)
-}
-
-#[cfg(not(unix))]
-fn readable_by_all(_: &std::fs::File) -> std::io::Result<()> {
     Ok(())
 }
 

@@ -3,6 +3,8 @@
 
 pub mod vec3;
 
+use std::sync::OnceLock;
+
 /// The instruction set in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Isa {
@@ -11,9 +13,21 @@ pub enum Isa {
     Portable,
 }
 
-/// The best instruction set of this processor (the standard library caches the answer).
+/// Where this variable of the environment is set, whatever to, the program uses plain arrays on every processor.
+pub const PORTABLE: &str = "BONEPD_PORTABLE";
+
+/// The instruction set in use, chosen at the first call.
 #[inline]
 pub fn isa() -> Isa {
+    static CHOSEN: OnceLock<Isa> = OnceLock::new();
+    *CHOSEN.get_or_init(|| match std::env::var_os(PORTABLE) {
+        Some(_) => Isa::Portable,
+        None => best(),
+    })
+}
+
+/// The best instruction set of this processor.
+fn best() -> Isa {
     #[cfg(target_arch = "x86_64")]
     {
         let fma = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");

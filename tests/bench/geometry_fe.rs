@@ -24,6 +24,7 @@ use bonepd_ct::pipeline::apparent::{Method, SolveParams};
 use bonepd_ct::pipeline::phantom::PhantomParams;
 use bonepd_ct::solver::cg::CgParams;
 use bonepd_ct::solver::cg::fallback::minimise_or_fall_back;
+use bonepd_ct::system;
 use bonepd_ct::volume::Specimen;
 use std::path::Path;
 use std::time::Instant;
@@ -64,6 +65,7 @@ fn timed<T>(name: &str, part: impl FnOnce() -> T) -> T {
 }
 
 /// Processor time of this process in seconds, all threads.
+#[cfg(unix)]
 fn cpu_s() -> f64 {
     let mut at = libc::timespec {
         tv_sec: 0,
@@ -74,11 +76,14 @@ fn cpu_s() -> f64 {
     at.tv_sec as f64 + 1e-9 * at.tv_nsec as f64
 }
 
+/// Not asked for elsewhere.
+#[cfg(not(unix))]
+fn cpu_s() -> f64 {
+    f64::NAN
+}
+
 fn peak_mib() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"));
-    let kib = line.and_then(|line| line.split_whitespace().nth(1)?.parse::<f64>().ok());
-    kib.map_or(f64::NAN, |kib| kib / 1024.0)
+    system::peak_bytes().map_or(f64::NAN, |bytes| bytes / (1024.0 * 1024.0))
 }
 
 fn phantom() -> Specimen {

@@ -5,6 +5,7 @@ use crate::draw::map;
 use crate::error::{Error, Result};
 use crate::export::points;
 use crate::image::scan;
+use crate::io::named;
 use crate::record::stiffness;
 use crate::scene::continuum_molecular::Material;
 use crate::scene::setting::Inputs;
@@ -16,12 +17,12 @@ pub fn read(scene: &mut Scene, folder: &Path, say: impl Fn(String)) -> Result<In
     match &mut scene.setting.geometry {
         Geometry::Polygon(polygon) => {
             if let Some(file) = &polygon.file {
-                polygon.corners = points::read_corners(&folder.join(file))?;
+                polygon.corners = points::read_corners(&named::beside(folder, file))?;
             }
             Ok(Inputs::default())
         }
         Geometry::Image(image) => {
-            let (n, values) = map::read_brightness(&folder.join(&image.file))?;
+            let (n, values) = map::read_brightness(&named::beside(folder, &image.file))?;
             let inside = values.iter().map(|v| *v >= 0.5).collect();
             Ok(Inputs {
                 bitmap: Some(Bitmap { n, inside }),
@@ -30,10 +31,10 @@ pub fn read(scene: &mut Scene, folder: &Path, say: impl Fn(String)) -> Result<In
             })
         }
         Geometry::Slice(slice) => {
-            let mask = read_section(&folder.join(&slice.file), slice)?;
+            let mask = read_section(&named::beside(folder, &slice.file), slice)?;
             let grey = match &slice.grey {
                 Some(file) => {
-                    let path = folder.join(file);
+                    let path = named::beside(folder, file);
                     let grey = read_section(&path, slice)?;
                     mask.require_alike(&grey, &path)?;
                     Some(grey.values)
@@ -67,7 +68,7 @@ pub fn read_stiffness(scene: &Scene, folder: &Path) -> Result<Option<[[f64; 6]; 
     };
     match model.problem.elasticity().map(|e| &e.material) {
         Some(Material::FromScan { scan, .. }) => {
-            stiffness::read(&folder.join(&scan.file)).map(Some)
+            stiffness::read(&named::beside(folder, &scan.file)).map(Some)
         }
         _ => Ok(None),
     }

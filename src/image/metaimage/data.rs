@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::format::header::Header;
 use crate::format::raw::pattern;
 use crate::format::raw::{self, Layout};
+use crate::io::named;
 use flate2::bufread::ZlibDecoder;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
@@ -46,7 +47,10 @@ pub fn files(header: &Header, path: &Path) -> Result<Vec<PathBuf>> {
         ));
     }
     let folder = path.parent().unwrap_or(Path::new("."));
-    Ok(names.iter().map(|name| folder.join(name)).collect())
+    Ok(names
+        .iter()
+        .map(|name| named::beside(folder, name))
+        .collect())
 }
 
 /// The voxels in one file; `after`: the header's length, where they follow it. HeaderSize counts from the file's beginning.

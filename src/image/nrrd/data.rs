@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::format::header::Header;
 use crate::format::raw::pattern;
 use crate::format::raw::{self, Layout};
+use crate::io::named;
 use bzip2::bufread::MultiBzDecoder;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
@@ -62,7 +63,10 @@ pub fn files(header: &Header, path: &Path) -> Result<Vec<PathBuf>> {
         ));
     }
     let folder = path.parent().unwrap_or(Path::new("."));
-    Ok(names.iter().map(|name| folder.join(name)).collect())
+    Ok(names
+        .iter()
+        .map(|name| named::beside(folder, name))
+        .collect())
 }
 
 fn encoding(header: &Header, path: &Path) -> Result<Encoding> {

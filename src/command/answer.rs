@@ -52,6 +52,16 @@ pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answ
     Ok(answer)
 }
 
+/// The answer of a scan in memory, which `rows` are all of; `target` is the relative error asked for. None where no row has a modulus,
+/// force or moment.
+pub fn of_rows(rows: &[Row], record: &SegmentRecord, target: Option<f64>) -> Option<Answer> {
+    let mut facts = of_record(record);
+    if let (Some(target), Some(condition)) = (target, condition(rows)) {
+        facts.targets.set(&condition, target);
+    }
+    answer::answer(rows, &facts)
+}
+
 /// The answer of the scan in `dir` under the condition of `rows`, which one command solved there.
 ///
 /// # Errors

@@ -34,7 +34,7 @@
 //!
 //! | layer | module | owns |
 //! |---|---|---|
-//! | 0 | [`error`], [`par`], [`simd`] | messages to the person at the keyboard; vector sums that repeat on any number of threads; eight lanes chosen at run time |
+//! | 0 | [`error`], [`par`], [`parts`], [`simd`] | messages to the person at the keyboard; vector sums that repeat on any number of threads; which numbers belong together; eight lanes chosen at run time |
 //! | 1 | [`grid`] | indices, voxels, millimetres |
 //! | 2 | [`volume`], [`io`] | values on a grid and the segmented specimen; files written whole, tables |
 //! | 3 | [`format`](mod@crate::format), [`mask`] | what file formats share: raw voxels, lengths, orientation, calibration; turning and resampling, smoothing, thresholds, volumes of interest, connected components |
@@ -73,6 +73,8 @@ pub mod measure;
 pub mod operator;
 #[doc(hidden)]
 pub mod par;
+#[doc(hidden)]
+pub mod parts;
 #[doc(hidden)]
 pub mod physics;
 pub mod pipeline;

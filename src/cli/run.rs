@@ -47,7 +47,7 @@ pub struct RunArgs {
     only: Option<String>,
     /// Choose the resolution of each scan so that its stated error (solver, elements, shape) stays below this, as 3% or 0.03;
     /// exit 1 where it cannot be met
-    #[arg(long, value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "lp", "boundary", "structure"])]
+    #[arg(long, value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "lp_mm", "boundary", "structure"])]
     error: Option<f64>,
     #[command(flatten)]
     segment: SegmentSettings,

@@ -1,5 +1,6 @@
 //! `segment`: which voxels are bone.
 
+use super::settings::overrides::lay_over;
 use super::{print_json, words};
 use bonepd_ct::command::Outcome;
 use bonepd_ct::error::Result;
@@ -9,6 +10,7 @@ use bonepd_ct::image::array::headerless::Contents;
 use bonepd_ct::machine::session::Session;
 use bonepd_ct::pipeline::segment::{Align, AlignBox, SegmentParams, Voi};
 use clap::Args;
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Find the bone in a scan: crop, turn, smooth, threshold, volume of interest, largest connected piece
@@ -26,13 +28,14 @@ pub struct SegmentArgs {
     settings: SegmentSettings,
 }
 
-#[derive(Args)]
+/// The fields are the keys of `[segment]`.
+#[derive(Args, Serialize)]
 #[command(next_help_heading = "Segmentation")]
 pub struct SegmentSettings {
     /// Voxel size in mm, one number or one per axis; overrides the file's. The axes x, y, z are those that `info`
     /// prints: patient or world axes where the file gives its orientation, else the stored ones
-    #[arg(long, value_name = "MM[,MM,MM]", value_parser = words::sizes)]
-    spacing: Option<[f64; 3]>,
+    #[arg(long = "spacing", value_name = "MM[,MM,MM]", value_parser = words::sizes)]
+    spacing_mm: Option<[f64; 3]>,
     /// What is in a file of voxels without a header (.raw, .vol), as 512,512,300,uint16; add `be` for big-endian numbers
     /// (uint16be), and the bytes before the first voxel (512,512,300,uint16,1024)
     #[arg(long, value_name = "NX,NY,NZ,TYPE[,SKIP]")]
@@ -51,14 +54,16 @@ pub struct SegmentSettings {
     #[arg(long, conflicts_with_all = ["lower", "upper"])]
     otsu: bool,
     /// Values that are bone in a labelled scan, comma-separated (100,127); instead of a threshold
-    #[arg(long, value_name = "VALUES", value_delimiter = ',', conflicts_with_all = ["lower", "upper", "otsu", "gaussian"])]
+    #[arg(long, value_name = "VALUES", value_delimiter = ',', conflicts_with_all = ["lower", "upper", "otsu", "gaussian_voxels"])]
     labels: Vec<i32>,
     /// Smooth with a Gaussian of this σ in voxels before the threshold [default: off]
-    #[arg(long, value_name = "VOXELS", value_parser = words::number)]
-    gaussian: Option<f64>,
+    #[arg(long = "gaussian", value_name = "VOXELS", value_parser = words::number)]
+    gaussian_voxels: Option<f64>,
     /// Volume of interest: box, cylinder (the largest that fits), cylinder:D or cylinder:D,X,Y in mm, or a mask file
     /// on the scan's grid [default: box]
+    // A mask's path need not be text, so it is no plain copy.
     #[arg(long, value_name = "VOI", value_parser = words::voi())]
+    #[serde(skip)]
     voi: Option<Voi>,
     /// Keep voxels first:end along each axis (x, y, z as `info` prints them); the end is not included
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = words::crop)]
@@ -67,8 +72,8 @@ pub struct SegmentSettings {
     #[arg(long, value_name = "AXIS", value_parser = words::choice::<Axis>(&["x", "y", "z"]))]
     turn: Option<Axis>,
     /// Bring the scan to this voxel size in mm, one number or one per axis (after the turn)
-    #[arg(long, value_name = "MM[,MM,MM]", value_parser = words::sizes)]
-    resample: Option<[f64; 3]>,
+    #[arg(long = "resample", value_name = "MM[,MM,MM]", value_parser = words::sizes)]
+    resample_mm: Option<[f64; 3]>,
     /// Rotate the scan until this points along z: fabric (the longest mean intercept lengths), or X,Y,Z
     #[arg(long, value_name = "fabric|X,Y,Z", value_parser = words::align, allow_negative_numbers = true)]
     align: Option<Align>,
@@ -77,8 +82,8 @@ pub struct SegmentSettings {
     #[arg(long, value_name = "BOX", value_parser = words::choice::<AlignBox>(&["inside", "whole"]))]
     align_box: Option<AlignBox>,
     /// Cut uneven ends flat: each end is cut back until every tile of this width (mm) that contains bone reaches the plane
-    #[arg(long, value_name = "MM", value_parser = words::positive)]
-    plane_cut: Option<f64>,
+    #[arg(long = "plane-cut", value_name = "MM", value_parser = words::positive)]
+    plane_cut_mm: Option<f64>,
     /// Keep every voxel, not only the largest connected piece
     #[arg(long)]
     keep_all: bool,
@@ -97,41 +102,23 @@ pub struct SegmentSettings {
 }
 
 impl SegmentSettings {
-    /// Options that were given override `params`.
+    /// Options that were given override `params`. A threshold or labels replace what `params` find bone by.
     pub fn apply(&self, params: &mut SegmentParams) -> Result<()> {
-        if self.otsu {
-            (params.otsu, params.lower, params.upper) = (true, None, None);
+        let window = self.lower.is_some() || self.upper.is_some();
+        let labels = !self.labels.is_empty();
+        if self.otsu || labels {
+            (params.lower, params.upper) = (None, None);
         }
-        if self.lower.is_some() || self.upper.is_some() {
+        if window || labels {
             params.otsu = false;
         }
-        if self.otsu || self.lower.is_some() || self.upper.is_some() {
+        if window || self.otsu {
             params.labels.clear();
         }
-        if !self.labels.is_empty() {
-            (params.otsu, params.lower, params.upper) = (false, None, None);
+        if labels {
             params.gaussian_voxels = 0.0;
-            params.labels.clone_from(&self.labels);
         }
-        params.keep_grey |= self.keep_grey;
-        params.no_grey |= self.no_grey;
-        params.blur_voxels = self.blur_voxels.or(params.blur_voxels);
-        params.spacing_mm = self.spacing.or(params.spacing_mm);
-        params.raw = self.raw.or(params.raw);
-        params.units = self.units.or(params.units);
-        params.lower = self.lower.or(params.lower);
-        params.upper = self.upper.or(params.upper);
-        params.crop = self.crop.or(params.crop);
-        params.turn = self.turn.unwrap_or(params.turn);
-        params.resample_mm = self.resample.or(params.resample_mm);
-        params.align = self.align.or(params.align);
-        params.align_box = self.align_box.unwrap_or(params.align_box);
-        params.plane_cut_mm = self.plane_cut.or(params.plane_cut_mm);
-        params.keep_all |= self.keep_all;
-        params.morphometry |= self.morphometry;
-        if let Some(sigma) = self.gaussian {
-            params.gaussian_voxels = sigma;
-        }
+        lay_over(params, self)?;
         if let Some(voi) = &self.voi {
             params.voi = voi.clone();
         }

@@ -1,11 +1,15 @@
 //! Settings that several verbs take: tissue, lattices.
 
+pub mod overrides;
+
 use super::words;
 use bonepd_ct::error::{Error, Result};
 use bonepd_ct::physics::material::{Law, Material};
 use bonepd_ct::pipeline::apparent::SolveParams;
 use bonepd_ct::pipeline::lattice::{BoundaryWord, LatticeParams, Structure};
 use clap::Args;
+use overrides::lay_over;
+use serde::Serialize;
 
 /// What bone is made of.
 #[derive(Args)]
@@ -51,38 +55,30 @@ impl TissueSettings {
     }
 }
 
-#[derive(Args)]
+/// The fields are the keys of `[lattice]`.
+#[derive(Args, Serialize)]
 #[command(next_help_heading = "Lattice")]
 pub struct LatticeSettings {
     /// Lattice structures, comma-separated [default: sc]
     #[arg(long, value_delimiter = ',', value_parser = words::choice::<Structure>(&["sc", "bcc", "fcc"]))]
     structure: Vec<Structure>,
     /// Lattice parameters in mm, comma-separated [default: 0.06,0.08,0.10,0.12]
-    #[arg(long, value_name = "MM", value_delimiter = ',', value_parser = words::positive)]
-    lp: Vec<f64>,
+    #[arg(long = "lp", value_name = "MM", value_delimiter = ',', value_parser = words::positive)]
+    lp_mm: Vec<f64>,
     /// How the lattice meets the bone's surface, comma-separated: firm, floppy, connected (sc: a site per connected component
     /// of bone in a cell), weighted (bcc, fcc: sites weighted by the bone fraction of their cell). graded, the older word,
     /// means connected on sc and weighted on bcc and fcc; result files say graded for both [default: firm,floppy]
     #[arg(long, value_delimiter = ',', value_parser = words::choice::<BoundaryWord>(&["firm", "floppy", "connected", "weighted", "graded"]))]
     boundary: Vec<BoundaryWord>,
     /// Shift the lattice by this many mm along x, y, z
-    #[arg(long, value_name = "X,Y,Z", value_parser = words::triple, allow_hyphen_values = true)]
-    registration: Option<[f64; 3]>,
+    #[arg(long = "registration", value_name = "X,Y,Z", value_parser = words::triple, allow_hyphen_values = true)]
+    registration_mm: Option<[f64; 3]>,
 }
 
 impl LatticeSettings {
     /// Options that were given override `params`.
     pub fn apply(&self, params: &mut LatticeParams) -> Result<()> {
-        if !self.structure.is_empty() {
-            params.structure = self.structure.clone();
-        }
-        if !self.lp.is_empty() {
-            params.lp_mm = self.lp.clone();
-        }
-        if !self.boundary.is_empty() {
-            params.boundary = self.boundary.clone();
-        }
-        params.registration_mm = self.registration.unwrap_or(params.registration_mm);
+        lay_over(params, self)?;
         params.check()
     }
 }

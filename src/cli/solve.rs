@@ -1,5 +1,6 @@
 //! `solve`: the apparent modulus.
 
+use super::settings::overrides::lay_over;
 use super::settings::{LatticeSettings, TissueSettings};
 use super::{print_json, words};
 use crate::cli::words::law;
@@ -14,6 +15,7 @@ use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams};
 use bonepd_ct::result::row::Row;
 use clap::Args;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Compress a segmented scan and compute its apparent modulus E_app
@@ -31,7 +33,7 @@ pub struct SolveArgs {
     /// Choose the resolution so that the stated error (solver, elements, shape) stays below this, as 3% or
     /// 0.03; exit 1 where it cannot be met. With --plasticity the error of the strength (load steps, elements,
     /// solver)
-    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "element_mm", "lp", "boundary", "structure"])]
+    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "element_mm", "lp_mm", "boundary", "structure"])]
     error: Option<f64>,
     /// Also write the model for another program: inp (voxel-fe, geometry-fe: CalculiX, Abaqus), stl (geometry-fe: the
     /// surface), vtu (geometry-fe: the mesh, for ParaView)
@@ -42,7 +44,8 @@ pub struct SolveArgs {
     bins: u16,
 }
 
-#[derive(Args)]
+/// The fields are the keys of `[solve]`, but for those that are skipped.
+#[derive(Args, Serialize)]
 #[command(next_help_heading = "Solve")]
 pub struct SolveSettings {
     /// lattice (the lattice element method), voxel-fe (one hexahedron per bone voxel), or geometry-fe (tetrahedra of ten
@@ -50,6 +53,7 @@ pub struct SolveSettings {
     #[arg(long, value_parser = words::choice::<Method>(Method::WORDS))]
     method: Option<Method>,
     #[command(flatten)]
+    #[serde(skip)]
     tissue: TissueSettings,
     /// Poisson's ratio of the bone tissue, below 0.5; from 0.4 to 0.49 voxel elements pass from full integration to mean
     /// dilatation [default: 0.3]
@@ -90,6 +94,7 @@ pub struct SolveSettings {
     refine: Option<u16>,
     /// voxel-fe: split each voxel of the mask into N³ elements, also of a grey scan: converges to the voxel staircase
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), conflicts_with_all = ["coarsen", "refine"])]
+    #[serde(skip)]
     refine_mask: Option<u16>,
     /// voxel-fe: one element per N³ voxels
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -123,12 +128,15 @@ pub struct SolveSettings {
     /// voxel-fe: find the failure load, where 2 % of the bone exceed an effective strain of 0.007 (Pistoia et al. 2002); the failure
     /// loads at 1 to 7 % go to DIR/failure.csv
     #[arg(long)]
+    #[serde(skip)]
     failure: bool,
     /// Share of the bone in that criterion, as 2% or 0.02
     #[arg(long, value_name = "SHARE", value_parser = words::fraction, requires = "failure")]
+    #[serde(skip)]
     critical_volume: Option<f64>,
     /// Effective strain in that criterion
     #[arg(long, value_name = "STRAIN", value_parser = words::fraction, requires = "failure")]
+    #[serde(skip)]
     critical_strain: Option<f64>,
     /// voxel-fe: tissue that yields: von-mises:YIELD[,HARDENING], or asymmetric:TENSION,COMPRESSION[,HARDENING] (Drucker-Prager
     /// through both yield stresses), MPa; without HARDENING it is perfectly plastic. Per label as
@@ -163,38 +171,13 @@ impl SolveSettings {
             self.refuse_resolution()?;
             params.method = Method::VoxelFe;
         }
-        params.method = self.method.unwrap_or(params.method);
+        lay_over(params, self)?;
         self.tissue.apply(params)?;
-        params.poisson = self.poisson.unwrap_or(params.poisson);
-        params.strain = self.strain.unwrap_or(params.strain);
-        params.grip_mm = self.grip_mm.unwrap_or(params.grip_mm);
-        params.load = self.load.unwrap_or(params.load);
-        params.angle_deg = self.angle_deg.unwrap_or(params.angle_deg);
-        params.ends = self.ends.unwrap_or(params.ends);
-        params.conditions = self.conditions.unwrap_or(params.conditions);
-        params.axis = self.axis.unwrap_or(params.axis);
-        params.tolerance = self.tolerance.unwrap_or(params.tolerance);
-        let refine = self.refine.or(self.refine_mask);
-        params.refine = refine.map_or(params.refine, usize::from);
-        params.refine_mask = match refine {
-            Some(_) => self.refine_mask.is_some(),
-            None => params.refine_mask,
-        };
-        params.coarsen_by = self.coarsen_by.unwrap_or(params.coarsen_by);
-        params.coarsen = self.coarsen.map_or(params.coarsen, usize::from);
-        params.element_mm = self.element_mm.or(params.element_mm);
-        params.mechanisms |= self.mechanisms;
-        if !self.fields.is_empty() {
-            params.fields.clone_from(&self.fields);
+        if let Some(n) = self.refine_mask {
+            params.refine = n.into();
         }
-        params.sed = self.sed.unwrap_or(params.sed);
-        params.statistics |= self.statistics;
-        if let Some(plasticity) = &self.plasticity {
-            params.plasticity = Some(plasticity.clone());
-        }
-        params.steps = self.steps.map_or(params.steps, usize::from);
-        if !self.failure_labels.is_empty() {
-            params.failure_labels.clone_from(&self.failure_labels);
+        if self.refine.or(self.refine_mask).is_some() {
+            params.refine_mask = self.refine_mask.is_some();
         }
         if self.failure {
             let criterion = params.pistoia.get_or_insert_default();
@@ -307,8 +290,15 @@ fn export(
 
 /// The settings that options are laid over: those of the run that the folder belongs to, else the defaults.
 fn start(args: &SolveArgs, session: &Session) -> SolveParams {
-    let Some((path, params)) = run_settings::of_run(&args.dir) else {
-        return SolveParams::default();
+    let (path, params) = match run_settings::of_run(&args.dir) {
+        Ok(Some(of_run)) => of_run,
+        Ok(None) => return SolveParams::default(),
+        Err(e) => {
+            session.warn(format!(
+                "load, ends and tissue are not taken from the run that made this folder: {e}"
+            ));
+            return SolveParams::default();
+        }
     };
     session.say(format!(
         "note: load, ends and tissue are those of the run ({}), where no option here sets them: {}. Method and resolution are not the run's",

@@ -1,5 +1,6 @@
 //! Owns what a later `solve` in a run's folder takes from the run: its load, its ends and its tissue.
 
+use crate::error::Result;
 use crate::io::own_files::RECIPE;
 use crate::pipeline::apparent::SolveParams;
 use crate::recipe::Recipe;
@@ -8,12 +9,14 @@ use std::path::{Path, PathBuf};
 
 /// Settings of the run that segmented `dir`, and where they stand; None where no run did. Method, resolution and what is to be
 /// recorded stay the defaults.
-pub fn of_run(dir: &Path) -> Option<(PathBuf, SolveParams)> {
-    let dir = dir.canonicalize().ok()?;
-    specimen::record(&dir)?;
-    let path = dir.parent()?.join(RECIPE);
-    let text = std::fs::read_to_string(&path).ok()?;
-    let run = Recipe::parse(&text, &path).ok()?.solve;
+///
+/// # Errors
+/// The recipe of a run that this version cannot read.
+pub fn of_run(dir: &Path) -> Result<Option<(PathBuf, SolveParams)>> {
+    let Some((path, text)) = recipe(dir) else {
+        return Ok(None);
+    };
+    let run = Recipe::parse(&text, &path)?.solve;
     let params = SolveParams {
         young_mpa: run.young_mpa,
         poisson: run.poisson,
@@ -29,7 +32,16 @@ pub fn of_run(dir: &Path) -> Option<(PathBuf, SolveParams)> {
         tolerance: run.tolerance,
         ..SolveParams::default()
     };
-    Some((path, params))
+    Ok(Some((path, params)))
+}
+
+/// Path and text of the recipe of that run.
+fn recipe(dir: &Path) -> Option<(PathBuf, String)> {
+    let dir = dir.canonicalize().ok()?;
+    specimen::record(&dir)?;
+    let path = dir.parent()?.join(RECIPE);
+    let text = std::fs::read_to_string(&path).ok()?;
+    Some((path, text))
 }
 
 /// The settings in a line.

@@ -53,7 +53,7 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
     let mut inputs = inputs::read(&mut scene, folder, |line| session.warn(line))?;
     inputs.stiffness = inputs::read_stiffness(&scene, folder)?;
     if session.dry_run {
-        let points = check(&scene, &inputs)?;
+        let points = check(&scene, &inputs)?.points()?;
         session.say(format!(
             "{}: {} points; results would go to {}",
             scene.setting.title,
@@ -100,10 +100,23 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
     Ok((outcome, Some(record)))
 }
 
-/// Tells scenes apart that go different ways.
+/// Tells scenes apart that go different ways: by the program's version, the scene as it is written, and the values of its files.
 fn fingerprint(scene: &Scene, inputs: &Inputs) -> String {
-    let all = format!("{} {scene:?} {inputs:?}", env!("CARGO_PKG_VERSION"));
-    blake3::hash(all.as_bytes()).to_hex().to_string()
+    let mut hasher = blake3::Hasher::new();
+    let scene = serde_json::to_vec(scene).expect("a scene is plain data");
+    let bitmap = inputs.bitmap.as_ref();
+    let parts: [&[u8]; 6] = [
+        env!("CARGO_PKG_VERSION").as_bytes(),
+        &scene,
+        bitmap.map_or(&[], |b| bytemuck::bytes_of(&b.n)),
+        bitmap.map_or(&[], |b| bytemuck::cast_slice(&b.inside)),
+        bytemuck::cast_slice(inputs.grey.as_deref().unwrap_or_default()),
+        inputs.stiffness.as_ref().map_or(&[], bytemuck::bytes_of),
+    ];
+    for part in parts {
+        hasher.update(&part.len().to_le_bytes()).update(part);
+    }
+    hasher.finalize().to_hex().to_string()
 }
 
 fn in_words(record: &SceneRecord) -> String {

@@ -1,6 +1,7 @@
-//! What file formats share: streams of raw voxels, packed strips, lengths in words, orientation, calibration of grey values.
+//! What file formats share: headers of text, streams of raw voxels, packed strips, lengths in words, orientation, calibration of grey values.
 
 pub mod calibration;
+pub mod header;
 pub mod length;
 pub mod orient;
 pub mod raw;

@@ -1,21 +1,12 @@
-//! Owns connected components through voxel faces (6 neighbours), over runs of bone along x: a run is one node, so memory
-//! and time go with the number of runs, not of voxels.
+//! Owns connected components through voxel faces (6 neighbours).
 
+use crate::mask::runs::{Runs, Touching};
 use crate::volume::Volume;
 use rayon::prelude::*;
 
-/// Consecutive bone voxels `start..end` of one row.
-#[derive(Debug, Clone, Copy)]
-struct Run {
-    start: u32,
-    end: u32,
-}
-
 /// The components of a mask.
 pub struct Components {
-    runs: Vec<Run>,
-    /// First run of each row, and the number of runs at the end.
-    rows: Vec<usize>,
+    runs: Runs,
     /// Component of each run, numbered in the order in which components first appear.
     label: Vec<u32>,
     /// Voxels of each component.
@@ -28,39 +19,14 @@ impl Components {
     /// # Panics
     /// At 2³² runs or more (some 10⁴ million voxels).
     pub fn of(mask: &Volume<u8>) -> Self {
-        let [nx, ny, _] = mask.grid.n;
-        let found: Vec<Vec<Run>> = mask.as_slice().par_chunks(nx).map(runs_of).collect();
-        let mut rows = Vec::with_capacity(found.len() + 1);
-        let mut runs = Vec::with_capacity(found.iter().map(Vec::len).sum());
-        for row in found {
-            rows.push(runs.len());
-            runs.extend(row);
+        let runs = Runs::of(mask.grid.n, mask.as_slice(), |&v| v != 0);
+        let (label, count) = runs.parts(Touching::Faces);
+        let mut voxels = vec![0; count];
+        for (run, &label) in runs.runs.iter().zip(&label) {
+            voxels[label as usize] += u64::from(run.x1 - run.x0);
         }
-        rows.push(runs.len());
-        let mut parent: Vec<u32> =
-            (0..u32::try_from(runs.len()).expect("fewer than 2³² runs")).collect();
-        for row in 0..rows.len() - 1 {
-            if row % ny > 0 {
-                join(
-                    &mut parent,
-                    &runs,
-                    rows[row - 1]..rows[row],
-                    rows[row]..rows[row + 1],
-                );
-            }
-            if row >= ny {
-                join(
-                    &mut parent,
-                    &runs,
-                    rows[row - ny]..rows[row - ny + 1],
-                    rows[row]..rows[row + 1],
-                );
-            }
-        }
-        let (label, voxels) = number(parent, &runs);
         Components {
             runs,
-            rows,
             label,
             voxels,
         }
@@ -84,9 +50,10 @@ impl Components {
             .par_chunks_mut(nx)
             .enumerate()
             .for_each(|(row, voxels)| {
-                for run in self.rows[row]..self.rows[row + 1] {
-                    if self.label[run] != keep {
-                        voxels[self.runs[run].start as usize..self.runs[run].end as usize].fill(0);
+                for i in self.runs.rows[row]..self.runs.rows[row + 1] {
+                    let run = self.runs.runs[i];
+                    if self.label[i] != keep {
+                        voxels[run.x0 as usize..run.x1 as usize].fill(0);
                     }
                 }
             });
@@ -96,79 +63,12 @@ impl Components {
     pub fn spanning_z(&self, mask: &Volume<u8>) -> Vec<u32> {
         let [_, ny, nz] = mask.grid.n;
         let of = |slice: usize| -> std::collections::BTreeSet<u32> {
-            (self.rows[slice * ny]..self.rows[(slice + 1) * ny])
+            (self.runs.rows[slice * ny]..self.runs.rows[(slice + 1) * ny])
                 .map(|run| self.label[run])
                 .collect()
         };
         of(0).intersection(&of(nz - 1)).copied().collect()
     }
-}
-
-fn runs_of(row: &[u8]) -> Vec<Run> {
-    let mut runs = Vec::new();
-    let mut at = 0;
-    while let Some(skip) = row[at..].iter().position(|&v| v != 0) {
-        let start = at + skip;
-        let end = row[start..]
-            .iter()
-            .position(|&v| v == 0)
-            .map_or(row.len(), |len| start + len);
-        runs.push(Run {
-            start: start as u32,
-            end: end as u32,
-        });
-        at = end;
-    }
-    runs
-}
-
-/// Unites the runs of two neighbouring rows that overlap; both rows are sorted, one walk does.
-fn join(parent: &mut [u32], runs: &[Run], a: std::ops::Range<usize>, b: std::ops::Range<usize>) {
-    let (mut i, mut j) = (a.start, b.start);
-    while i < a.end && j < b.end {
-        if runs[i].start < runs[j].end && runs[j].start < runs[i].end {
-            unite(parent, i as u32, j as u32);
-        }
-        if runs[i].end < runs[j].end {
-            i += 1;
-        } else {
-            j += 1;
-        }
-    }
-}
-
-fn root(parent: &mut [u32], mut run: u32) -> u32 {
-    while parent[run as usize] != run {
-        parent[run as usize] = parent[parent[run as usize] as usize];
-        run = parent[run as usize];
-    }
-    run
-}
-
-/// The earlier root stays root, so components are numbered in order of appearance.
-fn unite(parent: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(parent, a), root(parent, b));
-    if a < b {
-        parent[b as usize] = a;
-    } else {
-        parent[a as usize] = b;
-    }
-}
-
-fn number(mut parent: Vec<u32>, runs: &[Run]) -> (Vec<u32>, Vec<u64>) {
-    let mut voxels = Vec::new();
-    let mut label = vec![0u32; runs.len()];
-    for run in 0..runs.len() {
-        let root = root(&mut parent, run as u32) as usize;
-        if root == run {
-            label[run] = voxels.len() as u32;
-            voxels.push(0);
-        } else {
-            label[run] = label[root];
-        }
-        voxels[label[run] as usize] += u64::from(runs[run].end - runs[run].start);
-    }
-    (label, voxels)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ pub mod gaussian;
 pub mod regrid;
 pub mod resample;
 pub mod rotate;
+pub mod runs;
 pub mod threshold;
 pub mod unmeasured;
 pub mod upsample;

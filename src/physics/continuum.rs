@@ -39,32 +39,11 @@ pub struct Continuum {
 }
 
 /// Densities before the step.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Old {
-    Nodes(Vec<f64>),
-    /// Four a element.
-    Gauss(Vec<[f64; 4]>),
-}
-
-impl Old {
-    /// All densities in a row.
-    pub fn flat(&self) -> &[f64] {
-        match self {
-            Old::Nodes(nodes) => nodes,
-            Old::Gauss(gauss) => gauss.as_flattened(),
-        }
-    }
-
-    /// Densities in a row, at the places of these; a rest of fewer than an element's is left out.
-    pub fn like(&self, flat: &[f64]) -> Old {
-        match self {
-            Old::Nodes(_) => Old::Nodes(flat.to_vec()),
-            Old::Gauss(_) => {
-                let element = |four: &[f64]| std::array::from_fn(|g| four[g]);
-                Old::Gauss(flat.chunks_exact(4).map(element).collect())
-            }
-        }
-    }
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Old<'a> {
+    Nodes(&'a [f64]),
+    /// Four an element.
+    Gauss(&'a [[f64; 4]]),
 }
 
 /// Position of the Gauss points on the unit square, and of the corners.

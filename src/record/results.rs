@@ -39,6 +39,7 @@ pub fn has_old(dir: &Path) -> bool {
 
 /// The same where the mask in `dir` is not that of the results.
 pub fn set_aside_stale(dir: &Path, session: &Session) {
+    keep_other_version(dir, session);
     if session.dry_run {
         return;
     }
@@ -109,6 +110,7 @@ struct Record {
     rows: Vec<KeyedRow>,
 }
 
+// `segment.json` and `stiffness.json` have only program and version in common with this: a struct for two lines would be longer than they are.
 /// Where results come from, enough to make them again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Provenance {

@@ -12,12 +12,14 @@ pub mod step_statistics;
 use crate::discretisation::plane::Points;
 use crate::discretisation::plane::geometry::Geometry;
 use crate::error::{ADVICE, Error, Result};
+use crate::physics::bond_based::BondBased;
 use conditions::{Hold, Layers, Load, Time};
 use continuum_molecular::Molecular;
 use frame::{Observer, Output, Summary};
 use remodelling::bond_based::BondBasedParams;
-use remodelling::continuum::ContinuumParams;
-use remodelling::{bond_based, continuum};
+use remodelling::continuum::{ContinuumParams, Local};
+use remodelling::marcher::Marcher;
+use remodelling::{bond_based, continuum, time_loop};
 use serde::{Deserialize, Serialize};
 use setting::{GridParams, Inputs, Probe, Setting};
 use std::path::Path;
@@ -125,31 +127,68 @@ impl Scene {
     }
 }
 
-/// Refuses what a run would refuse before its first step. The material points.
-pub fn check(scene: &Scene, inputs: &Inputs) -> Result<Points> {
-    let setting = &scene.setting;
-    setting.output.check()?;
-    match &scene.physics {
-        Physics::BondBased(params) => bond_based::check(setting, params, inputs)?,
-        Physics::Continuum(params) => continuum::check(setting, params, inputs)?,
-        Physics::ContinuumMolecular(model) => {
-            continuum_molecular::check::check(setting, model, inputs)?;
-        }
-    }
-    setting.points(inputs)
+/// A scene that has been checked, with what was set up for that: a run goes on with it.
+pub struct Checked<'a> {
+    scene: &'a Scene,
+    inputs: &'a Inputs,
+    model: Model<'a>,
 }
 
-/// Runs a scene, reporting states to `observer` as they are accepted.
-pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Result<Summary> {
+/// What a scene's physics sets up.
+enum Model<'a> {
+    BondBased(Box<Marcher<BondBased>>),
+    Continuum(Box<Marcher<Local>>),
+    ContinuumMolecular(Box<continuum_molecular::check::Checked<'a>>),
+}
+
+/// # Errors
+/// What a run would refuse before its first step.
+pub fn check<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Result<Checked<'a>> {
     let setting = &scene.setting;
     setting.output.check()?;
-    match &scene.physics {
-        Physics::BondBased(params) => bond_based::run(setting, params, inputs, observer),
-        Physics::Continuum(params) => continuum::run(setting, params, inputs, observer),
+    let model = match &scene.physics {
+        Physics::BondBased(params) => {
+            let marcher = bond_based::marcher(setting, params, inputs)?;
+            time_loop::check(setting)?;
+            Model::BondBased(Box::new(marcher))
+        }
+        Physics::Continuum(params) => {
+            let marcher = continuum::marcher(setting, params, inputs)?;
+            time_loop::check(setting)?;
+            Model::Continuum(Box::new(marcher))
+        }
         Physics::ContinuumMolecular(model) => {
-            continuum_molecular::run(setting, model, inputs, observer)
+            let checked = continuum_molecular::check::check(setting, model, inputs)?;
+            Model::ContinuumMolecular(Box::new(checked))
+        }
+    };
+    Ok(Checked {
+        scene,
+        inputs,
+        model,
+    })
+}
+
+impl Checked<'_> {
+    /// The material points.
+    pub fn points(&self) -> Result<Points> {
+        self.scene.setting.points(self.inputs)
+    }
+
+    /// Runs the scene, reporting states to `observer` as they are accepted.
+    pub fn run(self, observer: &mut dyn Observer) -> Result<Summary> {
+        let (setting, inputs) = (&self.scene.setting, self.inputs);
+        match self.model {
+            Model::BondBased(marcher) => time_loop::run(*marcher, setting, inputs, observer),
+            Model::Continuum(marcher) => time_loop::run(*marcher, setting, inputs, observer),
+            Model::ContinuumMolecular(checked) => checked.run(observer),
         }
     }
+}
+
+/// Checks and runs a scene.
+pub fn run(scene: &Scene, inputs: &Inputs, observer: &mut dyn Observer) -> Result<Summary> {
+    check(scene, inputs)?.run(observer)
 }
 
 /// The expected key closest to the unknown one that serde names in its message.

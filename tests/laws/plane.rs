@@ -184,12 +184,11 @@ fn continuum_row(energy: Energy, name: &str) -> Model {
     let points = points();
     let (map, given, places) = at_rest(&points);
     let model = Continuum::new(&points, 1.0, energy, WEIGHT, None);
-    let old = Old::Nodes(vec![1.0; points.len()]);
     let step = continuum::Step {
         model: &model,
         map: &map,
         given: &given,
-        old: &old,
+        old: Old::Nodes(&vec![1.0; points.len()]),
         dt: 1.0,
         load: &[],
     };

@@ -24,7 +24,7 @@ fn plate(scene: &str, model: &str) -> String {
 /// The error of a run, which is that of a dry run; it must hold all the `words`.
 fn assert_refused(text: &str, words: &[&str]) {
     let scene = Scene::parse(text, Path::new("test.toml"));
-    let error = match scene.and_then(|scene| check(&scene, &Inputs::default())) {
+    let error = match scene.and_then(|scene| check(&scene, &Inputs::default()).map(drop)) {
         Ok(_) => panic!("passed: {words:?} {text}"),
         Err(error) => error.to_string(),
     };

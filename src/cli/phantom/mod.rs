@@ -86,6 +86,8 @@ struct Image {
 }
 
 impl PhantomArgs {
+    // One literal, which the compiler holds complete. `lay_over` saves no line here: seeds (u64) are no integers of TOML, and five
+    // options are no plain copies.
     fn params(&self) -> PhantomParams {
         let default = PhantomParams::default();
         let (shape, image) = (&self.shape, &self.image);

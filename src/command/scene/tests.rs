@@ -167,3 +167,54 @@ fn a_stopped_sweep_keeps_its_finished_values() {
         assert!(parts[name] == *bytes, "{name} differs");
     }
 }
+
+#[test]
+fn scenes_and_values_of_their_files_are_told_apart() {
+    use crate::discretisation::plane::geometry::Bitmap;
+    let scene = |spacing: &str| {
+        let text = format!(
+            "title = 'disc'
+             geometry.disc.radius = 1
+             [grid]
+             spacing = {spacing}
+             horizon_ratio = 3
+             [physics.bond-based]
+             young = 1.0"
+        );
+        Scene::parse(&text, Path::new("scene.toml")).unwrap()
+    };
+    let bitmap = |n, inside: [bool; 2]| {
+        let inside = inside.to_vec();
+        Some(Bitmap { n, inside })
+    };
+    let inputs = Inputs {
+        bitmap: bitmap([2, 1], [true, true]),
+        grey: Some(vec![0.1, 0.2]),
+        stiffness: Some([[1.0; 6]; 6]),
+    };
+    let others = [
+        Inputs::default(),
+        Inputs {
+            grey: Some(vec![0.1, 0.2_f64.next_up()]),
+            ..inputs.clone()
+        },
+        Inputs {
+            stiffness: Some([[1.0_f64.next_up(); 6]; 6]),
+            ..inputs.clone()
+        },
+        Inputs {
+            bitmap: bitmap([1, 2], [true, true]),
+            ..inputs.clone()
+        },
+        Inputs {
+            bitmap: bitmap([2, 1], [true, false]),
+            ..inputs.clone()
+        },
+    ];
+    let print = fingerprint(&scene("0.1"), &inputs);
+    assert_eq!(fingerprint(&scene("0.10"), &inputs.clone()), print);
+    assert_ne!(fingerprint(&scene("0.2"), &inputs), print);
+    for other in &others {
+        assert_ne!(fingerprint(&scene("0.1"), other), print, "{other:?}");
+    }
+}

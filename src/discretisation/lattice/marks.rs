@@ -32,6 +32,34 @@ impl Marks {
         }
     }
 
+    /// Of `0..n`, from where steps to `neighbours` lead to a number with `low` and to one with `high`.
+    pub fn between<I: Iterator<Item = usize>>(
+        n: usize,
+        low: impl Fn(usize) -> bool + Sync,
+        high: impl Fn(usize) -> bool + Sync,
+        neighbours: impl Fn(usize) -> I + Sync,
+    ) -> Marks {
+        let (mut both, high) = rayon::join(
+            || Marks::reached(n, &low, &neighbours),
+            || Marks::reached(n, &high, &neighbours),
+        );
+        both.keep(&high);
+        both
+    }
+
+    fn reached<I: Iterator<Item = usize>>(
+        n: usize,
+        seed: impl Fn(usize) -> bool,
+        neighbours: impl Fn(usize) -> I,
+    ) -> Marks {
+        let mut seen = Marks::none(n);
+        let mut queue: Vec<usize> = (0..n).filter(|&i| seed(i) && seen.add(i)).collect();
+        while let Some(i) = queue.pop() {
+            queue.extend(neighbours(i).filter(|&next| seen.add(next)));
+        }
+        seen
+    }
+
     /// The members in order.
     pub fn iter(&self) -> impl Iterator<Item = usize> {
         self.words.iter().enumerate().flat_map(|(w, &word)| {

@@ -150,38 +150,16 @@ fn step(frame: &Frame, at: [i32; 3], direction: [i32; 3]) -> Option<usize> {
 /// Candidates with a path of bonds to both grips.
 fn load_carrying(frame: &Frame, weights: &[f32], stencil: &Stencil, grips: Grips) -> Marks {
     let a = frame.axis.index();
-    let (mut low, high) = rayon::join(
-        || reached(frame, weights, stencil, |at| at[a] <= grips.low),
-        || reached(frame, weights, stencil, |at| at[a] >= grips.high),
-    );
-    low.keep(&high);
-    low
-}
-
-/// Candidates with a path of bonds to a seed.
-fn reached(
-    frame: &Frame,
-    weights: &[f32],
-    stencil: &Stencil,
-    seed: impl Fn([i32; 3]) -> bool,
-) -> Marks {
-    let mut seen = Marks::none(weights.len());
-    let mut queue: Vec<usize> = (0..weights.len())
-        .filter(|&c| weights[c] > 0.0 && seed(frame.indices(c)))
-        .collect();
-    for &c in &queue {
-        seen.add(c);
-    }
-    while let Some(c) = queue.pop() {
-        let at = frame.indices(c);
-        for b in 0..stencil.coordination() {
-            if let Some(n) = step(frame, at, stencil.direction(b))
-                && weights[n] > 0.0
-                && seen.add(n)
-            {
-                queue.push(n);
-            }
-        }
-    }
-    seen
+    let plane = |c: usize| (weights[c] > 0.0).then(|| frame.indices(c)[a]);
+    Marks::between(
+        weights.len(),
+        |c| plane(c).is_some_and(|plane| plane <= grips.low),
+        |c| plane(c).is_some_and(|plane| plane >= grips.high),
+        |c| {
+            let at = frame.indices(c);
+            (0..stencil.coordination())
+                .filter_map(move |b| step(frame, at, stencil.direction(b)))
+                .filter(move |&n| weights[n] > 0.0)
+        },
+    )
 }

@@ -5,6 +5,7 @@ pub mod geometry;
 pub mod layers;
 
 use crate::error::{Error, Result};
+use crate::parts;
 
 const NONE: u32 = u32::MAX;
 
@@ -111,27 +112,15 @@ impl Points {
 
     /// The piece (by edge neighbours) each point belongs to, and the number of pieces.
     pub fn pieces(&self) -> (Vec<u32>, usize) {
-        let mut piece = vec![NONE; self.len()];
-        let mut count = 0;
-        let mut stack = Vec::new();
-        for seed in 0..self.len() {
-            if piece[seed] != NONE {
-                continue;
-            }
-            piece[seed] = count;
-            stack.push(seed);
-            while let Some(point) = stack.pop() {
-                let [i, j] = self.cells[point];
-                for cell in [[i + 1, j], [i - 1, j], [i, j + 1], [i, j - 1]] {
-                    if let Some(next) = self.at(cell).filter(|&p| piece[p] == NONE) {
-                        piece[next] = count;
-                        stack.push(next);
-                    }
+        let mut up = parts::apart(self.len());
+        for (point, &[i, j]) in self.cells.iter().enumerate() {
+            for next in [[i + 1, j], [i, j + 1]] {
+                if let Some(next) = self.at(next) {
+                    parts::join(&mut up, point as u32, next as u32);
                 }
             }
-            count += 1;
         }
-        (piece, count as usize)
+        parts::numbered(up)
     }
 
     /// Refuses an empty set, and one in several pieces: a piece without support of its own could move freely.

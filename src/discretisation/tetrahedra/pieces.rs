@@ -1,6 +1,7 @@
 //! Owns which elements share faces, which faces are free, and which connected pieces reach what they must.
 
 use super::mesh::{Corners, Mesh};
+use crate::parts;
 use rayon::prelude::*;
 
 /// The three corners across from corner `c`, seen from outside in the order of a positive area.
@@ -50,31 +51,11 @@ impl Faces {
 
 /// The piece of every element (pieces are joined by faces), numbered in the order of their first elements, and how many there are.
 pub fn pieces(elements: usize, shared: &[[u32; 2]]) -> (Vec<u32>, usize) {
-    let mut parent: Vec<u32> = (0..elements as u32).collect();
-    for [a, b] in shared {
-        let (a, b) = (root(&mut parent, *a), root(&mut parent, *b));
-        parent[a.max(b) as usize] = a.min(b);
+    let mut up = parts::apart(elements);
+    for &[a, b] in shared {
+        parts::join(&mut up, a, b);
     }
-    let mut count = 0;
-    let mut name = vec![0; elements];
-    for e in 0..elements {
-        let r = root(&mut parent, e as u32) as usize;
-        if r == e {
-            name[e] = count;
-            count += 1;
-        } else {
-            name[e] = name[r];
-        }
-    }
-    (name, count as usize)
-}
-
-fn root(parent: &mut [u32], mut e: u32) -> u32 {
-    while parent[e as usize] != e {
-        parent[e as usize] = parent[parent[e as usize] as usize];
-        e = parent[e as usize];
-    }
-    e
+    parts::numbered(up)
 }
 
 /// Which elements a load reaches.

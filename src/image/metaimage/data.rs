@@ -1,8 +1,8 @@
 //! Owns the voxels of a MetaImage: after the header, in one file or in several.
 
 use super::ADVICE;
-use super::header::Header;
 use crate::error::{Error, Result};
+use crate::format::header::Header;
 use crate::format::raw::pattern;
 use crate::format::raw::{self, Layout};
 use flate2::bufread::ZlibDecoder;

@@ -46,11 +46,11 @@ mod data;
 mod header;
 
 use crate::error::{Error, Result};
+use crate::format::header::Header;
 use crate::format::length;
 use crate::format::orient::{Affine, column_norms, from_lps, scaled};
 use crate::format::raw::{Layout, Scalar};
 use crate::image::stored::Stored;
-use header::Header;
 use std::path::{Path, PathBuf};
 
 const ADVICE: &str = "export it again, for example with ITK-SNAP or SimpleITK";
@@ -61,7 +61,11 @@ pub fn read(path: &Path) -> Result<Stored> {
     let mut notes = Vec::new();
     let spacing_mm = spacing(&header, path, &mut notes)?;
     let affine = affine(&header, spacing_mm, path, &mut notes)?;
-    if header.starts_with("Seq_Frame") {
+    if header
+        .fields
+        .iter()
+        .any(|(key, _)| key.starts_with("Seq_Frame"))
+    {
         notes.push(
             "the header describes a sequence of frames: if the third axis is time, this is no scan"
                 .into(),

@@ -1,8 +1,8 @@
 //! Owns the axes of an NRRD: which of them are x, y, z, their voxel size and orientation.
 
 use super::ADVICE;
-use super::header::Header;
 use crate::error::{Error, Result};
+use crate::format::header::Header;
 use crate::format::length;
 use crate::format::orient::{Affine, column_norms};
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! Owns the voxels of an NRRD: in one file or several, skipped to, decompressed.
 
 use super::ADVICE;
-use super::header::Header;
 use crate::error::{Error, Result};
+use crate::format::header::Header;
 use crate::format::raw::pattern;
 use crate::format::raw::{self, Layout};
 use bzip2::bufread::MultiBzDecoder;

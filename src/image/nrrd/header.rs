@@ -2,8 +2,7 @@
 
 use super::ADVICE;
 use crate::error::{Error, Result};
-use crate::format::raw;
-use std::io::BufRead;
+use crate::format::header::{Header, Next};
 use std::path::Path;
 
 /// All fields of the definition, without their blanks.
@@ -39,98 +38,50 @@ const FIELDS: [&str; 28] = [
 ];
 const MORE_FIELDS: [&str; 2] = ["spacedirections", "measurementframe"];
 
-pub struct Header {
-    fields: Vec<(String, String)>,
-    /// Bytes up to where the data begin, if they are in the same file.
-    pub length: u64,
-    /// Names of data files, where the header lists them.
-    pub listed: Vec<String>,
+/// Whether the data are numbers as text.
+pub fn is_text(header: &Header) -> bool {
+    let encoding = header.get("encoding").unwrap_or_default().to_lowercase();
+    ["txt", "text", "ascii"].contains(&encoding.as_str())
 }
 
-impl Header {
-    /// By its name in small letters without blanks.
-    pub fn get(&self, key: &str) -> Option<&str> {
-        self.fields
-            .iter()
-            .find(|(k, _)| k == key)
-            .map(|(_, v)| v.as_str())
-    }
-
-    pub fn words(&self, key: &str) -> Vec<&str> {
-        self.get(key)
-            .map_or_else(Vec::new, |v| v.split_whitespace().collect())
-    }
-
-    /// `"mm" "mm" "s"`: what stands between quotation marks.
-    pub fn quoted(&self, key: &str) -> Vec<&str> {
-        self.get(key)
-            .map_or_else(Vec::new, |v| v.split('"').skip(1).step_by(2).collect())
-    }
-
-    pub fn is_text(&self) -> bool {
-        let encoding = self.get("encoding").unwrap_or_default().to_lowercase();
-        ["txt", "text", "ascii"].contains(&encoding.as_str())
-    }
-
-    /// What the definition does not know.
-    pub fn notes(&self) -> Vec<String> {
-        let known = |key: &str| FIELDS.contains(&key) || MORE_FIELDS.contains(&key);
-        self.fields
-            .iter()
-            .filter(|(key, _)| !known(key))
-            .map(|(key, _)| format!("the header's `{key}` is no field of NRRD: it is not used"))
-            .collect()
-    }
+/// What the definition does not know.
+pub fn notes(header: &Header) -> Vec<String> {
+    let known = |key: &str| FIELDS.contains(&key) || MORE_FIELDS.contains(&key);
+    let unknown = header.fields.iter().filter(|(key, _)| !known(key));
+    unknown
+        .map(|(key, _)| format!("the header's `{key}` is no field of NRRD: it is not used"))
+        .collect()
 }
 
-/// Reads lines up to the empty one, or up to the end where the data are in other files.
+/// Reads lines up to the empty one, or up to the end where the data are in other files. Names are in small letters without blanks.
 pub fn read(path: &Path) -> Result<Header> {
-    let (mut source, _) = raw::open_plain(path)?;
-    let mut header = Header {
-        fields: Vec::new(),
-        length: 0,
-        listed: Vec::new(),
-    };
-    let (mut first, mut in_list) = (true, false);
-    let mut line = Vec::new();
-    loop {
-        line.clear();
-        let got = source
-            .read_until(b'\n', &mut line)
-            .map_err(|e| Error::file(path, format!("its header cannot be read: {e}"), ADVICE))?;
-        header.length += got as u64;
-        let text = String::from_utf8_lossy(&line);
-        let text = text.trim_end();
-        if std::mem::take(&mut first) {
-            if !text.starts_with("NRRD000") {
-                return Err(Error::file(
-                    path,
-                    "is no NRRD: it does not begin with NRRD000",
-                    ADVICE,
-                ));
-            }
-        } else if in_list {
-            if !text.is_empty() {
-                header.listed.push(text.trim().to_string());
-            }
-        } else if text.is_empty() {
-            return Ok(header);
-        } else {
-            in_list = field(text, &mut header.fields);
+    let mut first = true;
+    Header::read(path, ADVICE, |line, fields| {
+        let line = line.unwrap_or_default();
+        if !std::mem::take(&mut first) {
+            return Ok(field(line, fields));
         }
-        if got == 0 {
-            return Ok(header);
+        match line.starts_with("NRRD000") {
+            true => Ok(Next::Line),
+            false => Err(Error::file(
+                path,
+                "is no NRRD: it does not begin with NRRD000",
+                ADVICE,
+            )),
         }
-    }
+    })
 }
 
-/// Keeps a field; true where a list of files follows.
-fn field(line: &str, fields: &mut Vec<(String, String)>) -> bool {
+/// Keeps a field.
+fn field(line: &str, fields: &mut Vec<(String, String)>) -> Next {
+    if line.is_empty() {
+        return Next::Data;
+    }
     let Some((key, value)) = line.split_once(':') else {
-        return false;
+        return Next::Line;
     };
     if line.starts_with('#') || value.starts_with('=') {
-        return false;
+        return Next::Line;
     }
     let mut key: String = key
         .to_lowercase()
@@ -143,5 +94,5 @@ fn field(line: &str, fields: &mut Vec<(String, String)>) -> bool {
     let value = value.trim();
     let is_list = key == "datafile" && value.split_whitespace().next() == Some("LIST");
     fields.push((key, value.to_string()));
-    is_list
+    if is_list { Next::List } else { Next::Line }
 }

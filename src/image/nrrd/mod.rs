@@ -42,16 +42,16 @@ mod header;
 
 use crate::error::{Error, Result};
 use crate::format::calibration::unit_named;
+use crate::format::header::Header;
 use crate::format::raw::{Layout, Scalar};
 use crate::image::stored::Stored;
-use header::Header;
 use std::path::{Path, PathBuf};
 
 const ADVICE: &str = "export it again, for example with 3D Slicer or SimpleITK";
 
 pub fn read(path: &Path) -> Result<Stored> {
     let header = header::read(path)?;
-    let mut notes = header.notes();
+    let mut notes = header::notes(&header);
     let axes = axes::axes(&header, path, &mut notes)?;
     let layout = layout(&header, axes.n, path)?;
     let values = data::read(&header, &layout, path)?;
@@ -93,7 +93,7 @@ fn layout(header: &Header, n: [usize; 3], path: &Path) -> Result<Layout> {
     let big_endian = match endian.as_deref() {
         Some("big") => true,
         Some("little") => false,
-        None if scalar.bytes() == 1 || header.is_text() => false,
+        None if scalar.bytes() == 1 || header::is_text(header) => false,
         other => {
             return Err(Error::file(
                 path,

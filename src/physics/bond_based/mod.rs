@@ -134,12 +134,7 @@ impl BondBased {
         state
     }
 
-    /// Entries of `∂R/∂q`: those of each unknown's own point and of its family.
-    pub fn pattern(&self, map: &Reduction) -> Sparse {
-        Sparse::from_pattern(map.unknowns(), |row, list| self.columns(map, row, 0, list))
-    }
-
-    /// Entries of the tangent among the unknowns from `first` on, numbered from there.
+    /// Entries of `∂R/∂q` among the unknowns from `first` on, numbered from there: those of each unknown's own point and of its family.
     pub fn pattern_from(&self, map: &Reduction, first: usize) -> Sparse {
         Sparse::from_pattern(map.unknowns() - first, |row, list| {
             self.columns(map, row + first, first, list);

@@ -14,7 +14,7 @@ pub struct Step<'a> {
     pub model: &'a Continuum,
     pub map: &'a Reduction,
     pub given: &'a [f64],
-    pub old: &'a Old,
+    pub old: Old<'a>,
     pub dt: f64,
     /// Force on each value (placements only); empty: none.
     pub load: &'a [f64],

@@ -2,7 +2,7 @@
 
 use super::equilibrium::{Factorised, factorise, right_hand_side, solve};
 use super::path::isolated;
-use super::setup::Setup;
+use super::setup::{Conductor, Setup};
 use super::steady::{loads, scalar, summary};
 use super::{Molecular, Steady, Transient};
 use crate::error::{Error, Result};
@@ -22,10 +22,10 @@ pub fn steady(
     scene: &Setting,
     model: &Molecular,
     steady: &Steady,
+    (body, k): Conductor,
     setup: &Setup,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    let (body, k) = setup.conductor(model, &steady.conduction)?;
     observer.start(&setup.points, 1)?;
     let held = setup.held(scene, model, CONDUCTED, STEADY, None)?;
     let force = loads(scene, model, setup, CONDUCTED, STEADY)?;
@@ -41,10 +41,10 @@ pub fn transient(
     scene: &Setting,
     model: &Molecular,
     params: &Transient,
+    (body, k): Conductor,
     setup: &Setup,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    let (body, k) = setup.conductor(model, &params.conduction)?;
     let time = marching(scene)?;
     let mut solver = TimeStepper::new(scene, model, setup, body, params.capacity, time.step)?;
     let start = vec![params.initial; setup.points.len()];

@@ -11,7 +11,7 @@ pub mod start;
 mod watch;
 
 use super::crack::Crack;
-use super::setup::Setup;
+use super::setup::{Conductor, Setup};
 use super::solid::Solid;
 use super::window::{Window, WindowBond, opposite};
 use super::{Fracture, Molecular};
@@ -84,6 +84,7 @@ pub fn run<const D: usize>(
     model: &Molecular,
     params: &Fracture,
     mut solid: Solid<D>,
+    conductor: Option<Conductor>,
     setup: &Setup,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
@@ -91,7 +92,7 @@ pub fn run<const D: usize>(
     let steps = time.steps()? as usize;
     solid.held = start::unit_load(scene, setup, &solid, time.end)?;
     observer.start(&setup.points, steps)?;
-    let mut growth = CrackGrowth::new(scene, model, params, solid, setup)?;
+    let mut growth = CrackGrowth::new(scene, model, params, solid, conductor, setup)?;
     observer.say(&format!(
         "bonds never break at {} of {} points, unbreakable or held in some component",
         growth.unbreakable_points(),

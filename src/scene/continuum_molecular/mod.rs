@@ -18,12 +18,15 @@ mod warnings;
 pub mod window;
 
 use crate::error::Result;
-use crate::physics::continuum_molecular::tensor::{Plane, PlaneTensor};
+use crate::physics::continuum_molecular::tensor::Plane;
 use crate::scene::conditions::Region;
 use crate::scene::frame::{Observer, Summary};
-use crate::scene::setting::{Inputs, Setting};
+use crate::scene::setting::Setting;
+use check::{Bodies, Checked, Solution};
 use file::MolecularFile;
 use serde::{Deserialize, Serialize};
+use setup::{Conductor, Setup};
+use solid::Solid;
 
 /// The table `[physics.continuum-molecular]`, which [`file`] reads.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -280,46 +283,42 @@ fn window() -> usize {
     800
 }
 
-/// Runs a continuum-molecular scene.
-///
-/// # Errors
-/// What [`check::check`] refuses, and a body that is not held or not stable.
-pub fn run(
-    scene: &Setting,
-    model: &Molecular,
-    inputs: &Inputs,
-    observer: &mut dyn Observer,
-) -> Result<Summary> {
-    check::check(scene, model, inputs)?;
-    match &model.sweep {
-        Some(sweep) => sweep::run(scene, model, sweep, inputs, observer),
-        None => solve(scene, model, inputs, observer),
+impl Checked<'_> {
+    /// Runs the scene.
+    ///
+    /// # Errors
+    /// A body that is not held or not stable.
+    pub fn run(self, observer: &mut dyn Observer) -> Result<Summary> {
+        let (scene, model, setup) = (self.scene, self.model, &self.setup);
+        match self.solution {
+            Solution::One(bodies) => solve(scene, model, setup, *bodies, observer),
+            Solution::Sweep(sweep) => sweep::run(scene, model, sweep, setup, self.inputs, observer),
+        }
     }
 }
 
-/// Solves a scene that has been checked, for one value of what is swept.
+/// Solves one value of what is swept.
 fn solve(
     scene: &Setting,
     model: &Molecular,
-    inputs: &Inputs,
+    setup: &Setup,
+    bodies: Bodies,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    let setup = setup::Setup::new(scene, model, inputs)?;
-    let warnings = warnings::negative(model, &setup, inputs)?;
+    let warnings = warnings::negative(model, setup, &bodies)?;
     warnings.iter().for_each(|words| observer.warn(words));
-    let solved = match &model.problem {
-        Problem::Steady(steady) => conduction::steady(scene, model, steady, &setup, observer),
-        Problem::Transient(transient) => {
-            conduction::transient(scene, model, transient, &setup, observer)
+    let solved = match bodies {
+        Bodies::Steady(steady, conductor) => {
+            conduction::steady(scene, model, steady, conductor, setup, observer)
         }
-        Problem::Static { elasticity, .. }
-        | Problem::Fracture { elasticity, .. }
-        | Problem::Vibration { elasticity, .. } => {
-            let tensor = elasticity.tensor(inputs)?;
-            match elasticity.turns(&setup.micromoduli(elasticity, &tensor)?) {
-                true => elastic::<3>(scene, model, elasticity, &tensor, &setup, observer),
-                false => elastic::<2>(scene, model, elasticity, &tensor, &setup, observer),
-            }
+        Bodies::Transient(transient, conductor) => {
+            conduction::transient(scene, model, transient, conductor, setup, observer)
+        }
+        Bodies::Straight(solid, conductor) => {
+            elastic(scene, model, solid, conductor, setup, observer)
+        }
+        Bodies::Turning(solid, conductor) => {
+            elastic(scene, model, solid, conductor, setup, observer)
         }
     };
     solved.map_err(|error| warnings::with_warnings(error, &warnings))
@@ -328,20 +327,22 @@ fn solve(
 fn elastic<const D: usize>(
     scene: &Setting,
     model: &Molecular,
-    elasticity: &Elasticity,
-    tensor: &PlaneTensor,
-    setup: &setup::Setup,
+    solid: Solid<D>,
+    conductor: Option<Conductor>,
+    setup: &Setup,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    let solid = solid::Solid::<D>::new(scene, model, elasticity, tensor, setup)?;
     match &model.problem {
-        Problem::Vibration { vibration, .. } => {
+        Problem::Vibration {
+            elasticity,
+            vibration,
+        } => {
             let vibration = vibration.of_continuum(&elasticity.material);
             modes::run(solid, &vibration, setup, observer)
         }
         Problem::Fracture { fracture, .. } => {
-            fracture::run(scene, model, fracture, solid, setup, observer)
+            fracture::run(scene, model, fracture, solid, conductor, setup, observer)
         }
-        _ => steady::deform(scene, model, tensor, solid, setup, observer),
+        _ => steady::deform(scene, model, solid, setup, observer),
     }
 }

@@ -1,6 +1,7 @@
 //! Owns whether currents find a path through a body whose bonds break.
 
 use crate::discretisation::plane::family::Family;
+use crate::parts;
 
 /// Points of pieces, as intact bonds join them, that take up a current and nowhere hold a potential: theirs has no bound.
 /// `held` and `force` are by point, `broken` by listed bond.
@@ -10,31 +11,21 @@ pub fn isolated(
     held: &[Option<f64>],
     force: &[[f64; 1]],
 ) -> Vec<bool> {
-    let mut isolated = vec![false; held.len()];
-    let mut seen = vec![false; held.len()];
-    let largest = force.iter().fold(0.0_f64, |m, f| m.max(f[0].abs()));
-    for start in 0..held.len() {
-        if seen[start] {
-            continue;
-        }
-        seen[start] = true;
-        let mut piece = vec![start];
-        let mut next = 0;
-        while let Some(&p) = piece.get(next) {
-            next += 1;
-            for slot in family.range(p).filter(|&slot| !broken[slot]) {
-                let (q, _) = family.kind(slot);
-                if !std::mem::replace(&mut seen[q], true) {
-                    piece.push(q);
-                }
-            }
-        }
-        let current: f64 = piece.iter().map(|&p| force[p][0]).sum();
-        if piece.iter().all(|&p| held[p].is_none()) && current.abs() > 1e-12 * largest {
-            piece.iter().for_each(|&p| isolated[p] = true);
+    let mut up = parts::apart(held.len());
+    for p in 0..held.len() {
+        for slot in family.range(p).filter(|&slot| !broken[slot]) {
+            parts::join(&mut up, p as u32, family.kind(slot).0 as u32);
         }
     }
-    isolated
+    let (piece, count) = parts::numbered(up);
+    let (mut current, mut is_held) = (vec![0.0; count], vec![false; count]);
+    for (p, &piece) in piece.iter().enumerate() {
+        current[piece as usize] += force[p][0];
+        is_held[piece as usize] |= held[p].is_some();
+    }
+    let largest = force.iter().fold(0.0_f64, |m, f| m.max(f[0].abs()));
+    let is_isolated = |p: usize| !is_held[p] && current[p].abs() > 1e-12 * largest;
+    piece.iter().map(|&p| is_isolated(p as usize)).collect()
 }
 
 #[cfg(test)]

@@ -12,6 +12,9 @@ use crate::physics::continuum_molecular::micromoduli::Micromoduli;
 use crate::physics::continuum_molecular::tensor::PlaneTensor;
 use crate::scene::setting::{Inputs, Setting};
 
+/// A conducting body, and the micro-conductivity of each bond of the stencil.
+pub type Conductor = (Body<1>, Vec<f64>);
+
 /// Points, their families without the bonds that cracks cut, and the bonds of a full family.
 pub struct Setup {
     pub points: Points,
@@ -24,8 +27,16 @@ pub struct Setup {
     layer: Vec<Option<f64>>,
 }
 
+#[cfg(test)]
+thread_local! {
+    /// How many set-ups this thread has built.
+    pub static SETUPS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+}
+
 impl Setup {
     pub fn new(scene: &Setting, model: &Molecular, inputs: &Inputs) -> Result<Self> {
+        #[cfg(test)]
+        SETUPS.set(SETUPS.get() + 1);
         let points = scene.points(inputs)?;
         let stencil = scene.stencil()?;
         let all = bonds(&stencil);
@@ -90,11 +101,7 @@ impl Setup {
     }
 
     /// The conducting body.
-    pub fn conductor(
-        &self,
-        model: &Molecular,
-        conduction: &Conduction,
-    ) -> Result<(Body<1>, Vec<f64>)> {
+    pub fn conductor(&self, model: &Molecular, conduction: &Conduction) -> Result<Conductor> {
         let tensor = conduction.tensor()?;
         let law = tensor.microconductivity(self.horizon(), conduction.exponent)?;
         let mut k: Vec<f64> = self.bonds.iter().map(|b| law.at(b.psi())).collect();

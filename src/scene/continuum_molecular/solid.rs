@@ -14,6 +14,7 @@ use crate::scene::setting::Setting;
 /// An elastic body and what is held of it at time 1 or at the end.
 pub struct Solid<const D: usize> {
     pub body: Body<D>,
+    pub tensor: PlaneTensor,
     /// Of each bond of the stencil.
     pub moduli: Vec<Moduli>,
     pub held: Vec<Option<f64>>,
@@ -60,6 +61,7 @@ impl<const D: usize> Solid<D> {
         let held = setup.held(scene, model, names, t, Some(tensor))?;
         Ok(Solid {
             body,
+            tensor: *tensor,
             moduli,
             held,
             thermal: match &model.problem {

@@ -5,7 +5,6 @@ use super::equilibrium::solve;
 use super::setup::Setup;
 use super::solid::Solid;
 use crate::error::Result;
-use crate::physics::continuum_molecular::tensor::PlaneTensor;
 use crate::scene::frame::{Field, Frame, Observer, Summary, Values};
 use crate::scene::setting::Setting;
 
@@ -71,7 +70,6 @@ pub fn displacement<const D: usize>(x: &[[f64; D]], scale: f64) -> Field {
 pub fn deform<const D: usize>(
     scene: &Setting,
     model: &Molecular,
-    tensor: &PlaneTensor,
     solid: Solid<D>,
     setup: &Setup,
     observer: &mut dyn Observer,
@@ -98,7 +96,9 @@ pub fn deform<const D: usize>(
             (Some(t), Some(p)) => t.expansion.map(|a| a * t.rise_at(setup.points.position(p))),
             _ => [0.0; 3],
         };
-        let exact = tensor.energy_density([e11 - a11, e22 - a22, shear - 2.0 * a12]);
+        let exact = solid
+            .tensor
+            .energy_density([e11 - a11, e22 - a22, shear - 2.0 * a12]);
         numbers.push(("energy_density_local".into(), exact));
     }
     let mut fields = vec![displacement(&x, 1.0)];

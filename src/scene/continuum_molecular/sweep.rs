@@ -2,7 +2,8 @@
 
 mod saved_state;
 
-use super::{KnownField, Molecular};
+use super::setup::Setup;
+use super::{KnownField, Molecular, check};
 use crate::discretisation::plane::Points;
 use crate::error::{Error, Result};
 use crate::scene::frame::{Frame, Observer, Summary};
@@ -92,11 +93,12 @@ pub fn run(
     scene: &Setting,
     model: &Molecular,
     sweep: &Sweep,
+    setup: &Setup,
     inputs: &Inputs,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     let mut warned = Vec::new();
-    observer.start(&scene.points(inputs)?, sweep.values.len())?;
+    observer.start(&setup.points, sweep.values.len())?;
     let (mut total, mut finished) = match observer.resume()? {
         Some(state) => saved_state::restore(&state)?,
         None => (
@@ -119,7 +121,9 @@ pub fn run(
             last: Frame::default(),
             warned: &mut warned,
         };
-        let one = super::solve(scene, &sweep.apply(model, value), inputs, &mut quiet)?;
+        let one = sweep.apply(model, value);
+        let bodies = check::bodies(scene, &one, setup, inputs)?;
+        let one = super::solve(scene, &one, setup, bodies, &mut quiet)?;
         let fields = std::mem::take(&mut quiet.last.fields);
         observer.frame(&Frame {
             time: value,

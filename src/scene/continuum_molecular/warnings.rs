@@ -1,31 +1,32 @@
 //! Owns words on bonds that pull where they should push: they change how a result is read, and may be why there is none.
 
+use super::check::Bodies;
 use super::setup::Setup;
 use super::solid::bending_moduli;
-use super::{Conduction, Elasticity, Molecular};
+use super::{Elasticity, Molecular};
 use crate::error::{Error, Result};
-use crate::scene::setting::Inputs;
+use crate::physics::continuum_molecular::tensor::PlaneTensor;
 
 /// What is negative in some direction, a line each.
-pub fn negative(model: &Molecular, setup: &Setup, inputs: &Inputs) -> Result<Vec<String>> {
+pub fn negative(model: &Molecular, setup: &Setup, bodies: &Bodies) -> Result<Vec<String>> {
     let mut words = Vec::new();
-    if let Some(elasticity) = model.problem.elasticity() {
-        elastic(elasticity, setup, inputs, &mut words)?;
+    if let (Some(elasticity), Some(tensor)) = (model.problem.elasticity(), bodies.tensor()) {
+        elastic(elasticity, tensor, setup, &mut words)?;
     }
-    if let Some(conduction) = model.problem.conduction() {
-        conducting(conduction, model, setup, &mut words)?;
+    if let Some((_, k)) = bodies.conductor() {
+        let advice = "heat flows back along such bonds; raise conduction.exponent to the ratio of the principal conductivities";
+        words.extend(lowest("micro-conductivity", k, setup, advice));
     }
     Ok(words)
 }
 
 fn elastic(
     elasticity: &Elasticity,
+    tensor: &PlaneTensor,
     setup: &Setup,
-    inputs: &Inputs,
     words: &mut Vec<String>,
 ) -> Result<()> {
-    let tensor = elasticity.tensor(inputs)?;
-    for negative in setup.micromoduli(elasticity, &tensor)?.negative() {
+    for negative in setup.micromoduli(elasticity, tensor)?.negative() {
         words.push(format!(
             "micromodulus {} is negative, {:.3} of the largest k_n at {:.0} degrees: the pair potential is not convex \
              there, and the body and its cracks may be unstable",
@@ -37,18 +38,6 @@ fn elastic(
         let advice = "raise bending.exponent above the ratio of the two moduli";
         words.extend(lowest("bending micromodulus", &k, setup, advice));
     }
-    Ok(())
-}
-
-fn conducting(
-    conduction: &Conduction,
-    model: &Molecular,
-    setup: &Setup,
-    words: &mut Vec<String>,
-) -> Result<()> {
-    let (_, k) = setup.conductor(model, conduction)?;
-    let advice = "heat flows back along such bonds; raise conduction.exponent to the ratio of the principal conductivities";
-    words.extend(lowest("micro-conductivity", &k, setup, advice));
     Ok(())
 }
 

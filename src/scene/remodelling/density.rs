@@ -230,12 +230,8 @@ pub struct Probes {
 }
 
 impl Probes {
-    /// All points have the same weight.
-    pub fn new(probes: &[Probe], points: &Points) -> Result<Self> {
-        Probes::weighted(probes, points, vec![1.0; points.len()])
-    }
-
-    pub fn weighted(probes: &[Probe], points: &Points, area: Vec<f64>) -> Result<Self> {
+    /// `area` is each point's weight.
+    pub fn new(probes: &[Probe], points: &Points, area: Vec<f64>) -> Result<Self> {
         let mut regions = vec![(String::new(), (0..points.len()).collect())];
         for (k, probe) in probes.iter().enumerate() {
             check_name(probes, k)?;

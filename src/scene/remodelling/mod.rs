@@ -5,6 +5,7 @@ pub mod bond_based;
 pub mod continuum;
 pub mod density;
 mod loads;
+pub mod marcher;
 pub mod solver;
 mod step_size;
-mod time_loop;
+pub mod time_loop;

@@ -3,7 +3,6 @@
 use crate::error::{Error, Result};
 use crate::operator::nonlinear::Staggered;
 use crate::operator::sparse::Sparse;
-use crate::scene::remodelling::time_loop::Advance;
 use crate::scene::state::State;
 use crate::solver::chord::Chord;
 use crate::solver::direct::dissection::nested_dissection;
@@ -40,6 +39,15 @@ pub enum Method {
     /// growth; it stops at the same residual. A step it cannot take is halved, or left to Newton's method if that is
     /// cheap.
     Reuse,
+}
+
+/// What one accepted step took.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Advance {
+    pub iterations: usize,
+    pub factorisations: usize,
+    /// Largest dimensionless residual left.
+    pub error: f64,
 }
 
 pub enum Equilibrium {

@@ -2,36 +2,14 @@
 
 use crate::error::Result;
 use crate::scene::conditions::Time;
-use crate::scene::frame::{Frame, Observer, Output, Summary};
+use crate::scene::frame::{Observer, Summary};
+use crate::scene::remodelling::marcher::{Marcher, Model};
+use crate::scene::remodelling::solver::Advance;
 use crate::scene::remodelling::step_size::StepSize;
+use crate::scene::setting::{Inputs, Setting};
 use crate::scene::state::State;
 use crate::scene::step_statistics::StepStatistics;
 use crate::solver::newton::NotConverged;
-
-/// A model that can be taken from one time to a later one.
-pub trait Marching {
-    /// Solves one step. On failure the state stays as it was.
-    fn advance(&mut self, before: f64, now: f64) -> std::result::Result<Advance, NotConverged>;
-    /// Times at which supports or loads jump or bend.
-    fn corners(&self) -> Vec<f64>;
-    /// Relative densities, as far as they change.
-    fn densities(&self) -> Vec<f64>;
-    /// The current state at time `t`.
-    fn frame(&self, t: f64, with_fields: bool) -> Frame;
-    /// Everything that later steps depend on.
-    fn save(&self, state: &mut State);
-    /// Goes back to a saved state: what follows is what would have followed it.
-    fn restore(&mut self, state: &State) -> Result<()>;
-}
-
-/// What one accepted step took.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Advance {
-    pub iterations: usize,
-    pub factorisations: usize,
-    /// Largest dimensionless residual left.
-    pub error: f64,
-}
 
 /// Successful steps after which a halved step is doubled.
 const GROW_AFTER: u32 = 4;
@@ -149,19 +127,24 @@ impl Progress {
 
 /// # Errors
 /// Times that no run can take.
-pub fn check(time: &Time) -> Result<()> {
-    Clock::new(time).map(|_| ())
+pub fn check(scene: &Setting) -> Result<()> {
+    Clock::new(scene.marching_time()?).map(|_| ())
 }
 
-/// Marches to `time.end`, from rest or from the state the observer kept. A step that fails at its smallest stops the
+/// Marches to the end of the scene's time, from rest or from the state the observer kept. A step that fails at its smallest stops the
 /// run: the last good state is reported with its fields and the summary says why.
-pub fn run_time_loop(
-    model: &mut impl Marching,
-    time: &Time,
-    output: &Output,
+pub fn run<M: Model>(
+    mut model: Marcher<M>,
+    scene: &Setting,
+    inputs: &Inputs,
     observer: &mut dyn Observer,
-    summary: &mut Summary,
-) -> Result<()> {
+) -> Result<Summary> {
+    let (time, output) = (scene.marching_time()?, &scene.output);
+    let mut summary = model.summary();
+    observer.start(
+        &scene.points(inputs)?,
+        (time.end / time.step).round() as usize,
+    )?;
     let clock = Clock::new(time)?;
     let mut step_size = StepSize::new(time, model.corners());
     let mut progress = Progress::default();
@@ -227,8 +210,8 @@ pub fn run_time_loop(
             }
         }
     }
-    progress.report(summary);
-    Ok(())
+    progress.report(&mut summary);
+    Ok(summary)
 }
 
 /// Why a step failed, and what a user can do.

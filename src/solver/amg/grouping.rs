@@ -4,6 +4,7 @@
 //! stick together; scraps join the neighbour they are tied to most. On coarser levels, a site and all its neighbours.
 
 use super::aggregate::NONE;
+use crate::parts::{apart, join, root as find};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -99,7 +100,7 @@ const CHUNK: usize = 1 << 17;
 
 /// Joins coupled sites of the same box: chunks of sites on their own, then across chunks.
 fn join_in_boxes(boxes: &[u32], rows: &impl Rows) -> Vec<u32> {
-    let mut root: Vec<u32> = (0..boxes.len() as u32).collect();
+    let mut root = apart(boxes.len());
     let chunk = CHUNK.min(boxes.len() / 8 + 1);
     let across: Vec<Vec<(u32, u32)>> = root
         .par_chunks_mut(chunk)
@@ -142,19 +143,6 @@ fn strongest(list: &[(u32, f32)], of: &[u32]) -> u32 {
         }
     }
     best.0
-}
-
-fn find(root: &mut [u32], mut i: u32) -> u32 {
-    while root[i as usize] != i {
-        root[i as usize] = root[root[i as usize] as usize];
-        i = root[i as usize];
-    }
-    i
-}
-
-fn join(root: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(root, a), find(root, b));
-    root[a.max(b) as usize] = a.min(b);
 }
 
 /// Joins every scrap to the piece it has most couplings with.

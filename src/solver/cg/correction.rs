@@ -3,9 +3,8 @@
 
 use crate::operator::held::Held;
 use crate::operator::{MixedPrecision, SinglePreconditioner};
-use crate::par::{CHUNK, each_chunk, sum_chunks};
-
-type Single = Vec<[f32; 3]>;
+use crate::par::{CHUNK, each_chunk};
+use crate::solver::cg::single::{Single, advance, combine, dot, image, narrow};
 
 /// When to stop: at a part of the start's squared energy norm, `rᵀz`, or at a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +55,7 @@ pub fn energy(
     if unit == 0.0 {
         return 0.0;
     }
-    narrow(b, unit, &mut room.r);
+    scaled(b, unit, &mut room.r);
     preconditioner.apply_single(&room.r, &mut room.z, &mut room.spare);
     unit * unit * dot(&room.r, &room.z)
 }
@@ -112,84 +111,11 @@ fn norm(b: &[[f64; 3]]) -> f64 {
     crate::par::dot(b, b).sqrt()
 }
 
-/// Part of the norm below which an entry is what rounding left of none: its products would fall below what single precision holds in
-/// full, and such take a hundred times as long.
-const ROUNDING: f64 = 1e-15;
-
-fn narrow(b: &[[f64; 3]], unit: f64, r: &mut [[f32; 3]]) {
-    let single = |v: f64| {
-        if (v / unit).abs() > ROUNDING {
-            (v / unit) as f32
-        } else {
-            0.0
-        }
-    };
+/// `r = b / unit`.
+fn scaled(b: &[[f64; 3]], unit: f64, r: &mut [[f32; 3]]) {
     each_chunk(r, CHUNK, |first, r| {
         for (r, b) in r.iter_mut().zip(&b[first..]) {
-            *r = b.map(single);
-        }
-        [0.0]
-    });
-}
-
-fn dot(x: &[[f32; 3]], y: &[[f32; 3]]) -> f64 {
-    sum_chunks(x.len(), |range| dot_chunk(&x[range.clone()], &y[range]))
-}
-
-fn dot_chunk(x: &[[f32; 3]], y: &[[f32; 3]]) -> f64 {
-    let mut lanes = [0.0; 3];
-    for (a, b) in x.iter().zip(y) {
-        for d in 0..3 {
-            lanes[d] += f64::from(a[d]) * f64::from(b[d]);
-        }
-    }
-    lanes.iter().sum()
-}
-
-/// `p = z + β p`.
-fn combine(p: &mut [[f32; 3]], z: &[[f32; 3]], beta: f32) {
-    each_chunk(p, CHUNK, |first, p| {
-        for (p, z) in p.iter_mut().zip(&z[first..]) {
-            for d in 0..3 {
-                p[d] = z[d] + beta * p[d];
-            }
-        }
-        [0.0]
-    });
-}
-
-/// `q = A p` in the free components; returns `p·q`.
-fn image(operator: &impl MixedPrecision, held: &Held, p: &[[f32; 3]], q: &mut [[f32; 3]]) -> f64 {
-    operator.apply_single(p, q, |first, q| {
-        for (q, bits) in q.iter_mut().zip(&held.0[first..]) {
-            for (d, q) in q.iter_mut().enumerate() {
-                if bits & (1 << d) != 0 {
-                    *q = 0.0;
-                }
-            }
-        }
-        dot_chunk(&p[first..first + q.len()], q)
-    })
-}
-
-/// `x += unit α p`, `r −= α q`.
-fn advance(
-    x: &mut [[f64; 3]],
-    r: &mut [[f32; 3]],
-    p: &[[f32; 3]],
-    q: &[[f32; 3]],
-    alpha: f64,
-    unit: f64,
-) {
-    each_chunk(x, CHUNK, |first, x| {
-        for (x, p) in x.iter_mut().zip(&p[first..]) {
-            (0..3).for_each(|d| x[d] += unit * alpha * f64::from(p[d]));
-        }
-        [0.0]
-    });
-    each_chunk(r, CHUNK, |first, r| {
-        for (r, q) in r.iter_mut().zip(&q[first..]) {
-            (0..3).for_each(|d| r[d] -= alpha as f32 * q[d]);
+            *r = b.map(|v| narrow(v / unit));
         }
         [0.0]
     });

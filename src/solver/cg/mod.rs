@@ -1,17 +1,18 @@
-//! Owns preconditioned conjugate gradients for `minimise ½ uᵀ A u` under prescribed unknowns.
+//! Owns preconditioned conjugate gradients for `minimise ½ uᵀ A u` under prescribed unknowns: the iterations and how they end, in any
+//! precision.
 
 pub mod correction;
+mod double;
 pub mod error;
 pub mod fallback;
 pub mod jacobi;
 pub mod mixed;
+mod single;
 pub mod widened;
 
-use crate::operator::held::{Constrained, Held};
-use crate::operator::{Functional, Operator, Preconditioner};
-use crate::par::{CHUNK, dot};
+use crate::operator::Functional;
 use crate::solver::cg::error::EnergyTail;
-use rayon::prelude::*;
+pub use double::minimise;
 
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +43,13 @@ impl Default for CgParams {
 
 /// Part of the start's energy below which the faces are joined by a mechanism. The start is the field of a homogeneous bar: 1e-10 of it is
 /// far below the stiffness of any body that bears load and far above double precision's rounding.
-pub(super) const MECHANISM_ENERGY: f64 = 1e-10;
+const MECHANISM_ENERGY: f64 = 1e-10;
+
+/// Fall of the residual's norm, or of the energy, after which both are computed again: far enough from what single precision resolves.
+const REPLACE: f64 = 1e-3;
+
+/// Energy, of that made the last time, above which it has risen by more than rounding: each iteration should lower it.
+const RISE: f64 = 1.0 + 1e-6;
 
 /// How a solve by conjugate gradients ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,54 +120,58 @@ pub struct CgStep {
     pub energy_error: Option<f64>,
 }
 
-/// Minimises `½ uᵀAu` over the unknowns that are not held, starting from (and keeping the held values of) `u`.
-///
-/// The energy is what prescribed displacements minimise, so its error is the squared energy norm of the algebraic
-/// error, which conjugate gradients estimates from its own coefficients ([`EnergyTail`]).
-///
-/// Where a `goal` is wanted instead of the energy, it is found to the same accuracy. Iteration `j` changes it by
-/// `α_j J(p_j)`, exactly; what later iterations will change it by is estimated from the sizes of the past changes
-/// ([`EnergyTail::goal_estimate`]). Their signs may differ, so this errs on the safe side.
-pub fn minimise<F: Functional<D>, const D: usize>(
-    operator: &impl Operator<D>,
-    held: &Held,
-    preconditioner: &impl Preconditioner<D>,
+/// The vectors of a solve in the precision that they are kept in: the residual `r`, `z ≈ A⁻¹ r`, the direction `p` and `A p`.
+trait Vectors<const D: usize> {
+    /// Whether the iterations alone keep residual and energy exact. If not, both are made again whenever one has fallen by a thousand.
+    const EXACT: bool;
+
+    /// One unit of `r` and `p`, in the units of `u`.
+    fn unit(&self) -> f64;
+
+    /// Makes `r` from `u`, in a unit that is `factor` times the one before.
+    fn residual(&mut self, u: &[[f64; D]], factor: f64) -> State;
+
+    /// `z = M⁻¹ r`; returns `rᵀz`.
+    fn precondition(&mut self) -> f64;
+
+    /// `p = z + β p`, `u += α p`, `r −= α A p`; returns `α` and `‖r‖`. None where `pᵀAp` or `rᵀz` is not positive.
+    fn step(&mut self, u: &mut [[f64; D]], rz: f64) -> Option<(f64, f64)>;
+
+    /// The goal of `p`.
+    fn along(&self, goal: &impl Functional<D>) -> f64;
+}
+
+/// Whether an iteration can be made with these.
+fn are_positive(curvature: f64, rz: f64) -> bool {
+    curvature > 0.0 && rz > 0.0 && curvature.is_finite() && rz.is_finite()
+}
+
+/// The iterations of [`minimise`], in any precision.
+fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
+    mut vectors: V,
     u: &mut [[f64; D]],
     params: &CgParams,
     goal: Option<&F>,
     mut observe: impl FnMut(CgStep),
 ) -> CgInfo {
-    let n = operator.sites();
-    let constrained = Constrained {
-        inner: operator,
-        held,
-    };
-    let mut r = vec![[0.0; D]; n];
-    operator.apply(u, &mut r);
-    let start_energy = dot(u, &r);
-    held.clear(&mut r);
-    negate(&mut r);
-    let start_norm = dot(&r, &r).sqrt();
-    let whole = params.reference_energy.unwrap_or(start_energy);
-    let mut z = vec![[0.0; D]; n];
-    let mut p = vec![[0.0; D]; n];
-    // A p of the last iteration.
-    let mut image = vec![[0.0; D]; n];
-    let mut alpha = 0.0;
+    let start = vectors.residual(u, 1.0);
+    let whole = params.reference_energy.unwrap_or(start.energy);
     let mut tail = EnergyTail::default();
     let mut goal_value = goal.map(|goal| goal.of(u));
-    let (mut rz_before, mut residual): (f64, f64) = (1.0, 1.0);
-    let (mut iterations, mut ended) = (0, Ended::IterationLimit);
-    if start_norm == 0.0 {
-        ended = Ended::ResidualTolerance;
-    }
+    // The energy when it was last made from the displacements, and what the iterations had gained by then.
+    let mut anchor = (start.energy, 0.0);
+    let expected = |anchor: (f64, f64), tail: &EnergyTail| anchor.0 - (tail.total() - anchor.1);
+    let (mut iterations, mut residual) = (0, 1.0);
+    let mut ended = match start.norm == 0.0 {
+        true => Ended::ResidualTolerance,
+        false => Ended::IterationLimit,
+    };
     while ended == Ended::IterationLimit {
-        preconditioner.apply(&r, &mut z);
-        held.clear(&mut z);
-        let rz = dot(&r, &z);
-        let energy = start_energy - tail.total();
+        let rz = vectors.precondition();
+        let unit = vectors.unit();
         if iterations > 0 {
-            let of_energy = tail.update(rz).map(|e| e / energy);
+            let energy = expected(anchor, &tail);
+            let of_energy = tail.update(unit * unit * rz).map(|e| e / energy);
             let error = tail.with_goal(of_energy, goal_value);
             observe(CgStep {
                 iteration: iterations,
@@ -176,58 +187,58 @@ pub fn minimise<F: Functional<D>, const D: usize>(
         if iterations >= params.max_iterations {
             break;
         }
-        // z·(r − r₋) / (r₋·z₋) with r − r₋ = −α A p: what rounding makes of the preconditioner is not quite symmetric.
-        let beta = match iterations {
-            0 => 0.0,
-            _ => -alpha * dot(&z, &image) / rz_before,
-        };
-        combine(&mut p, &z, beta);
-        constrained.apply(&p, &mut image);
-        let curvature = dot(&p, &image);
-        if !(curvature > 0.0 && rz > 0.0 && curvature.is_finite() && rz.is_finite()) {
+        let Some((alpha, norm)) = vectors.step(u, rz) else {
             ended = Ended::Breakdown;
             break;
-        }
-        // The step that minimises along p; r·p is r·z but for rounding.
-        alpha = dot(&r, &p) / curvature;
-        residual = advance(u, &mut r, &p, &image, alpha).sqrt() / start_norm;
-        rz_before = rz;
+        };
         iterations += 1;
-        tail.push(alpha, rz);
+        tail.push(alpha, unit * unit * rz);
         if let (Some(goal), Some(value)) = (goal, goal_value.as_mut()) {
-            let change = alpha * goal.of(&p);
+            let change = unit * alpha * vectors.along(goal);
             *value += change;
             tail.push_change(change);
         }
+        residual = unit * norm / start.norm;
+        let energy = expected(anchor, &tail);
         if residual <= params.residual_tolerance {
             ended = Ended::ResidualTolerance;
-        } else if start_energy - tail.total() <= MECHANISM_ENERGY * whole {
-            ended = Ended::Mechanism;
+        } else if V::EXACT {
+            if energy <= MECHANISM_ENERGY * whole {
+                ended = Ended::Mechanism;
+            }
+        } else if norm < REPLACE || energy < REPLACE * anchor.0 {
+            let now = vectors.residual(u, norm);
+            ended = match checked(ended, energy, now.energy, anchor.0) {
+                _ if now.energy > RISE * anchor.0 => Ended::Breakdown,
+                Ended::Breakdown => Ended::Breakdown,
+                _ if now.energy <= MECHANISM_ENERGY * whole => Ended::Mechanism,
+                _ if now.norm == 0.0 => Ended::ResidualTolerance,
+                goes_on => goes_on,
+            };
+            anchor = (now.energy, tail.total());
         }
     }
-    // What follows needs one vector more.
-    drop((z, p, image));
-    let end = state(operator, held, u);
-    ended = checked(ended, start_energy - tail.total(), end.energy, start_energy);
+    let end = vectors.residual(u, 1.0);
+    ended = checked(ended, expected(anchor, &tail), end.energy, anchor.0);
     CgInfo {
         ended,
         iterations,
-        residual: if start_norm > 0.0 {
-            end.norm / start_norm
+        residual: if start.norm > 0.0 {
+            end.norm / start.norm
         } else {
             0.0
         },
         energy: end.energy,
-        start_energy,
-        energy_error: energy_error(ended, &tail, end.energy, start_norm),
-        goal_error: goal_value.map(|value| goal_error(ended, &tail, value, start_norm)),
+        start_energy: start.energy,
+        energy_error: energy_error(ended, &tail, end.energy, start.norm),
+        goal_error: goal_value.map(|value| goal_error(ended, &tail, value, start.norm)),
     }
 }
 
 /// How a solve goes on or ends, given what its iterations say the energy is, what it is, and from what they began. In
 /// single precision each iteration is off by some 1e-7 of what it lowers the energy by, so all of them by 1e-7 of the start: the bounds
 /// leave room for a hundred times that, and for 1 % of a result far below the start.
-pub(super) fn checked(ended: Ended, expected: f64, energy: f64, start: f64) -> Ended {
+fn checked(ended: Ended, expected: f64, energy: f64, start: f64) -> Ended {
     match (energy - expected).abs() <= 1e-2 * energy.abs() + 1e-5 * start {
         true => ended,
         false => Ended::Breakdown,
@@ -235,12 +246,12 @@ pub(super) fn checked(ended: Ended, expected: f64, energy: f64, start: f64) -> E
 }
 
 /// Whether the estimated relative error of what is wanted meets its tolerance.
-pub(super) fn is_met(params: &CgParams, error: Option<f64>) -> bool {
+fn is_met(params: &CgParams, error: Option<f64>) -> bool {
     error.is_some_and(|e| (0.0..=params.energy_tolerance).contains(&e))
 }
 
 /// What to state as the excess of `energy` over its minimum.
-pub(super) fn energy_error(ended: Ended, tail: &EnergyTail, energy: f64, start_norm: f64) -> f64 {
+fn energy_error(ended: Ended, tail: &EnergyTail, energy: f64, start_norm: f64) -> f64 {
     match (ended, tail.estimate()) {
         (Ended::Breakdown, _) => energy,
         (_, Some(e)) => e,
@@ -250,7 +261,7 @@ pub(super) fn energy_error(ended: Ended, tail: &EnergyTail, energy: f64, start_n
 }
 
 /// What to state as the error of the goal.
-pub(super) fn goal_error(ended: Ended, tail: &EnergyTail, value: f64, start_norm: f64) -> f64 {
+fn goal_error(ended: Ended, tail: &EnergyTail, value: f64, start_norm: f64) -> f64 {
     match (ended, tail.goal_estimate()) {
         (Ended::Breakdown, _) => value.abs(),
         (_, Some(e)) => e,
@@ -260,68 +271,7 @@ pub(super) fn goal_error(ended: Ended, tail: &EnergyTail, value: f64, start_norm
 }
 
 /// Of a displacement field: its energy `uᵀAu` and the norm of its residual.
-pub(super) struct State {
-    pub energy: f64,
-    pub norm: f64,
-}
-
-/// State of `u`.
-fn state<const D: usize>(operator: &impl Operator<D>, held: &Held, u: &[[f64; D]]) -> State {
-    let mut r = vec![[0.0; D]; operator.sites()];
-    operator.apply(u, &mut r);
-    let energy = dot(u, &r);
-    held.clear(&mut r);
-    State {
-        energy,
-        norm: dot(&r, &r).sqrt(),
-    }
-}
-
-fn negate<const D: usize>(r: &mut [[f64; D]]) {
-    r.par_iter_mut()
-        .with_min_len(CHUNK)
-        .for_each(|r| *r = r.map(|v| -v));
-}
-
-/// `p = z + β p`.
-fn combine<const D: usize>(p: &mut [[f64; D]], z: &[[f64; D]], beta: f64) {
-    p.par_iter_mut()
-        .with_min_len(CHUNK)
-        .zip(z)
-        .for_each(|(p, z)| {
-            for c in 0..D {
-                p[c] = z[c] + beta * p[c];
-            }
-        });
-}
-
-/// `u += α p`, `r −= α q`; returns `r·r`, summed chunk by chunk.
-fn advance<const D: usize>(
-    u: &mut [[f64; D]],
-    r: &mut [[f64; D]],
-    p: &[[f64; D]],
-    q: &[[f64; D]],
-    alpha: f64,
-) -> f64 {
-    let chunks = (
-        u.par_chunks_mut(CHUNK),
-        r.par_chunks_mut(CHUNK),
-        p.par_chunks(CHUNK),
-        q.par_chunks(CHUNK),
-    );
-    let parts: Vec<f64> = chunks
-        .into_par_iter()
-        .map(|(u, r, p, q)| {
-            let mut sum = 0.0;
-            for (((u, r), p), q) in u.iter_mut().zip(r).zip(p).zip(q) {
-                for c in 0..D {
-                    u[c] += alpha * p[c];
-                    r[c] -= alpha * q[c];
-                    sum += r[c] * r[c];
-                }
-            }
-            sum
-        })
-        .collect();
-    parts.iter().sum()
+struct State {
+    energy: f64,
+    norm: f64,
 }

@@ -2,10 +2,13 @@
 
 use crate::discretisation::lattice::placement::overlaps;
 use crate::grid::Axis;
+use crate::parts;
 use crate::volume::Volume;
 
 /// Label of what is no bone.
 pub const NO_PIECE: u16 = u16::MAX;
+
+const LARGEST: u16 = u16::MAX - 2;
 
 /// A cell with bone in it.
 pub struct Cell {
@@ -73,7 +76,7 @@ impl Cell {
                 let to = (k * m[1] + j) * m[0];
                 for i in 0..m[0] {
                     if bone.as_slice()[row + i] != 0 {
-                        labels[to + i] = UNSEEN;
+                        labels[to + i] = 0;
                         any = true;
                     }
                 }
@@ -104,39 +107,27 @@ impl Cell {
     }
 }
 
-const UNSEEN: u16 = u16::MAX - 1;
-
 /// Labels connected bone through voxel faces, from 0. Returns how many labels there are.
 fn label(labels: &mut [u16], m: [usize; 3]) -> usize {
     let strides = [1, m[0], m[0] * m[1]];
-    let mut count = 0;
-    let mut queue = Vec::new();
-    for seed in 0..labels.len() {
-        // Beyond the largest label (never met: a cell would need 131 068 voxels) the rest counts as one component.
-        if labels[seed] != UNSEEN {
-            continue;
-        }
-        let own = (count as u16).min(UNSEEN - 1);
-        labels[seed] = own;
-        queue.push(seed);
-        while let Some(v) = queue.pop() {
-            for a in 0..3 {
-                let at = v / strides[a] % m[a];
-                let mut visit = |w: usize| {
-                    if labels[w] == UNSEEN {
-                        labels[w] = own;
-                        queue.push(w);
-                    }
-                };
-                if at > 0 {
-                    visit(v - strides[a]);
-                }
-                if at + 1 < m[a] {
-                    visit(v + strides[a]);
-                }
+    let mut up = parts::apart(labels.len());
+    for v in (0..labels.len()).filter(|&v| labels[v] != NO_PIECE) {
+        for a in 0..3 {
+            if !(v / strides[a]).is_multiple_of(m[a]) && labels[v - strides[a]] != NO_PIECE {
+                parts::join(&mut up, v as u32, (v - strides[a]) as u32);
             }
         }
-        count = usize::from(own) + 1;
+    }
+    let mut count = 0;
+    for v in 0..labels.len() {
+        let above = up[v] as usize;
+        if above != v {
+            labels[v] = labels[above];
+        } else if labels[v] != NO_PIECE {
+            // Beyond the largest label (never met: a cell would need 131 068 voxels) the rest counts as one component.
+            labels[v] = (count as u16).min(LARGEST);
+            count = usize::from(labels[v]) + 1;
+        }
     }
     count
 }

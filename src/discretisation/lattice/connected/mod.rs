@@ -14,6 +14,7 @@ mod bonding;
 mod cell;
 mod touching;
 
+use crate::discretisation::lattice::marks::Marks;
 use crate::discretisation::lattice::placement::Frame;
 use crate::discretisation::lattice::sites::Grips;
 use crate::volume::Volume;
@@ -42,26 +43,6 @@ impl Bonds {
                 self.share[b],
             )
         })
-    }
-}
-
-impl Bonds {
-    /// Sites with a path of bonds to a seed.
-    fn reached(&self, seed: impl Fn(usize) -> bool) -> Vec<bool> {
-        let sites = self.start.len() - 1;
-        let mut queue: Vec<usize> = (0..sites).filter(|&s| seed(s)).collect();
-        let mut seen = vec![false; sites];
-        for &s in &queue {
-            seen[s] = true;
-        }
-        while let Some(s) = queue.pop() {
-            for (end, ..) in self.of(s) {
-                if !std::mem::replace(&mut seen[end], true) {
-                    queue.push(end);
-                }
-            }
-        }
-        seen
     }
 
     /// Keeps the given sites, in ascending order, in place. A bond keeps both ends or neither: what it reaches, it
@@ -132,11 +113,14 @@ impl ConnectedSites {
         drop(touching);
         let axis = frame.axis.index();
         let plane = |p: usize| frame.indices(components[p].cell as usize)[axis];
-        let low = bonds.reached(|p| plane(p) <= grips.low);
-        let high = bonds.reached(|p| plane(p) >= grips.high);
-        let kept: Vec<usize> = (0..components.len())
-            .filter(|&p| low[p] && high[p])
-            .collect();
+        let kept: Vec<usize> = Marks::between(
+            components.len(),
+            |p| plane(p) <= grips.low,
+            |p| plane(p) >= grips.high,
+            |p| bonds.of(p).map(|(end, ..)| end),
+        )
+        .iter()
+        .collect();
         if kept.len() < components.len() {
             bonds.keep(&kept);
         }

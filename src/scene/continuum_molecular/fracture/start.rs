@@ -6,7 +6,7 @@ use crate::physics::continuum_molecular::toughness::critical_energy;
 use crate::scene::conditions::{Schedule, Time};
 use crate::scene::continuum_molecular::conduction::CONDUCTED;
 use crate::scene::continuum_molecular::crack::Crack;
-use crate::scene::continuum_molecular::setup::Setup;
+use crate::scene::continuum_molecular::setup::{Conductor, Setup};
 use crate::scene::continuum_molecular::solid::{DISPLACEMENT, Solid};
 use crate::scene::continuum_molecular::window::Window;
 use crate::scene::continuum_molecular::{Fracture, Molecular};
@@ -168,15 +168,12 @@ impl<'a, const D: usize> CrackGrowth<'a, D> {
         model: &'a Molecular,
         params: &'a Fracture,
         solid: Solid<D>,
+        conductor: Option<Conductor>,
         setup: &'a Setup,
     ) -> Result<Self> {
         let critical = critical(model, params, setup)?;
         let unbreakable = unbreakable(params, setup, &solid.held)?;
         let stop = stop(params, setup)?;
-        let conductor = match model.problem.conduction() {
-            Some(conduction) => Some(setup.conductor(model, conduction)?.0),
-            None => None,
-        };
         let (window, x) = Window::new(&solid.body, setup, &solid.held, &[])?;
         let mut growth = CrackGrowth {
             critical,
@@ -190,7 +187,7 @@ impl<'a, const D: usize> CrackGrowth<'a, D> {
             solid,
             unbreakable,
             crack: Crack::new(params.tip, stop),
-            conductor,
+            conductor: conductor.map(|(body, _)| body),
             window,
             bonds: Vec::new(),
             x,

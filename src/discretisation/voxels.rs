@@ -6,11 +6,9 @@
 //! is read in place of a missing one is a number of the same vector. Along a row, j moves in step with the node's own
 //! number over long stretches, the [`Segment`]s.
 
-pub mod loaded;
-
-use super::voxels::loaded::Runs;
 use crate::error::{Error, Result};
 use crate::grid::{Axis, Grid};
+use crate::mask::runs::{Run, Runs};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -77,7 +75,7 @@ pub fn connects<T: Sync>(
 
 /// The runs of the parts that reach from grip to grip.
 fn between(all: &Runs, grips: Planes) -> Runs {
-    let spans = |run: loaded::Run, y: usize, z: usize| match grips.axis {
+    let spans = |run: Run, y: usize, z: usize| match grips.axis {
         Axis::X => [run.x0 as usize, run.x1 as usize],
         Axis::Y => [y, y + 1],
         Axis::Z => [z, z + 1],
@@ -130,7 +128,7 @@ impl VoxelMesh {
     ) -> Result<Self> {
         let all = Runs::of(grid.n, voxels, is_bone);
         let [nx, ny, nz] = grid.n;
-        let outer = |run: super::voxels::loaded::Run, y: usize, z: usize| {
+        let outer = |run: Run, y: usize, z: usize| {
             run.x0 == 0 || run.x1 as usize == nx || y == 0 || y + 1 == ny || z == 0 || z + 1 == nz
         };
         let kept = all.spanning(outer, outer);

@@ -1,8 +1,7 @@
-//! Owns the question which voxels can carry load from one grip to the other.
-//!
-//! Elements that share a node, be it one, pass force to each other, so parts are connected through faces, edges and
-//! corners (26 neighbours). Work is on runs of voxels along x: a few per row instead of hundreds of voxels.
+//! Owns runs: consecutive voxels of one row along x, a few of them where there are hundreds of voxels. Which ones are connected is found
+//! from them alone, so memory and time go with the number of runs.
 
+use crate::parts;
 use rayon::prelude::*;
 
 /// Voxels `x0..x1` of one row.
@@ -10,6 +9,31 @@ use rayon::prelude::*;
 pub struct Run {
     pub x0: u32,
     pub x1: u32,
+}
+
+/// Which voxels are connected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Touching {
+    /// Those with a common face: 6 neighbours.
+    Faces,
+    /// Those with a common face, edge or corner: 26 neighbours.
+    Corners,
+}
+
+impl Touching {
+    /// Steps along y and z to the rows before one whose voxels may touch its own.
+    fn rows(self) -> &'static [[isize; 2]] {
+        match self {
+            Touching::Faces => &[[-1, 0], [0, -1]],
+            Touching::Corners => &[[-1, 0], [-1, -1], [0, -1], [1, -1]],
+        }
+    }
+
+    /// Whether runs of two such rows are connected.
+    fn joins(self, p: Run, q: Run) -> bool {
+        let reach = u32::from(self == Touching::Corners);
+        p.x0 < q.x1 + reach && q.x0 < p.x1 + reach
+    }
 }
 
 /// Runs of a volume, row by row (y faster than z).
@@ -59,22 +83,52 @@ impl Runs {
         self.runs.iter().map(|r| (r.x1 - r.x0) as usize).sum()
     }
 
-    /// The runs of those parts that hold a voxel with `low` and a voxel with `high`, tested on `(run, y, z)`.
+    /// The part that each run belongs to, numbered in the order in which parts first appear, and how many there are.
+    ///
+    /// # Panics
+    /// At 2³² runs or more (some 10⁴ million voxels).
+    pub fn parts(&self, touching: Touching) -> (Vec<u32>, usize) {
+        let mut up = parts::apart(self.runs.len());
+        for row in 0..self.n[1] * self.n[2] {
+            let (y, z) = ((row % self.n[1]) as isize, (row / self.n[1]) as isize);
+            for [dy, dz] in touching.rows() {
+                let (y, z) = (y + dy, z + dz);
+                if y >= 0 && z >= 0 && y < self.n[1] as isize {
+                    let before = z as usize * self.n[1] + y as usize;
+                    self.join(&mut up, touching, before, row);
+                }
+            }
+        }
+        parts::numbered(up)
+    }
+
+    /// Joins what touches in two rows; both are sorted, one walk does.
+    fn join(&self, up: &mut [u32], touching: Touching, a: usize, b: usize) {
+        let (mut i, mut j) = (self.rows[a], self.rows[b]);
+        while i < self.rows[a + 1] && j < self.rows[b + 1] {
+            let (p, q) = (self.runs[i], self.runs[j]);
+            if touching.joins(p, q) {
+                parts::join(up, i as u32, j as u32);
+            }
+            if p.x1 < q.x1 { i += 1 } else { j += 1 }
+        }
+    }
+
+    /// The runs of those parts that hold a voxel with `low` and a voxel with `high`, tested on `(run, y, z)`. Elements that share a
+    /// node, be it one, pass force to each other, so parts are connected through faces, edges and corners.
     pub fn spanning(
         &self,
         low: impl Fn(Run, usize, usize) -> bool,
         high: impl Fn(Run, usize, usize) -> bool,
     ) -> Runs {
-        let mut parts = Parts::new(self.runs.len());
-        self.join(&mut parts);
-        let mut touches = vec![0u8; self.runs.len()];
+        let (part, count) = self.parts(Touching::Corners);
+        let mut touches = vec![0u8; count];
         self.each(|i, run, y, z| {
-            let root = parts.root(i as u32) as usize;
-            touches[root] |= u8::from(low(run, y, z)) | u8::from(high(run, y, z)) << 1;
+            touches[part[i] as usize] |= u8::from(low(run, y, z)) | u8::from(high(run, y, z)) << 1;
         });
         let mut by_row = vec![Vec::new(); self.n[1] * self.n[2]];
         self.each(|i, run, y, z| {
-            if touches[parts.root(i as u32) as usize] == 3 {
+            if touches[part[i] as usize] == 3 {
                 by_row[z * self.n[1] + y].push(run);
             }
         });
@@ -86,32 +140,6 @@ impl Runs {
             for i in self.rows[row]..self.rows[row + 1] {
                 f(i, self.runs[i], row % self.n[1], row / self.n[1]);
             }
-        }
-    }
-
-    fn join(&self, parts: &mut Parts) {
-        for z in 0..self.n[2] {
-            for y in 0..self.n[1] {
-                let here = z * self.n[1] + y;
-                for (dy, dz) in [(-1, 0), (-1, -1), (0, -1), (1, -1)] {
-                    let (yy, zz) = (y as isize + dy, z as isize + dz);
-                    if yy < 0 || zz < 0 || yy >= self.n[1] as isize {
-                        continue;
-                    }
-                    self.join_rows(parts, here, zz as usize * self.n[1] + yy as usize);
-                }
-            }
-        }
-    }
-
-    fn join_rows(&self, parts: &mut Parts, a: usize, b: usize) {
-        let (mut i, mut j) = (self.rows[a], self.rows[b]);
-        while i < self.rows[a + 1] && j < self.rows[b + 1] {
-            let (p, q) = (self.runs[i], self.runs[j]);
-            if p.x0 <= q.x1 && q.x0 <= p.x1 {
-                parts.join(i as u32, j as u32);
-            }
-            if p.x1 < q.x1 { i += 1 } else { j += 1 }
         }
     }
 }
@@ -134,29 +162,6 @@ fn row_runs<T>(row: &[T], inside: &impl Fn(&T) -> bool) -> Vec<Run> {
         });
     }
     runs
-}
-
-/// Disjoint sets of run numbers; a set's root is its smallest member.
-struct Parts(Vec<u32>);
-
-impl Parts {
-    fn new(n: usize) -> Self {
-        Parts((0..n as u32).collect())
-    }
-
-    fn root(&mut self, mut i: u32) -> u32 {
-        while self.0[i as usize] != i {
-            let up = self.0[self.0[i as usize] as usize];
-            self.0[i as usize] = up;
-            i = up;
-        }
-        i
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use bonepd_ct::recipe::Recipe;
 use bonepd_ct::record::answer::Answer;
 use bonepd_ct::record::specimen::{SegmentRecord, SegmentedScan};
 use bonepd_ct::result::answer::best;
+use bonepd_ct::result::derived::with_derived;
 use bonepd_ct::result::details::Details;
 use bonepd_ct::result::row::Row;
 use bonepd_ct::volume::Volume;
@@ -144,7 +145,7 @@ fn solved(scan: Scan, recipe: &Recipe, session: &Session) -> Result<Solved> {
     let segmented = scan.segmented(&recipe.segment, session)?;
     session.stop.obey();
     let (mask, record) = (mask_of(&segmented), segmented.record.clone());
-    let (rows, met, mut scan) = match recipe.error {
+    let (met, mut scan) = match recipe.error {
         Some(target) => {
             if recipe.solve.plasticity.is_none() {
                 needs_modulus(recipe.solve.load, "error")?;
@@ -152,15 +153,17 @@ fn solved(scan: Scan, recipe: &Recipe, session: &Session) -> Result<Solved> {
             let widest = adaptive::widest(&recipe.solve);
             let mut scan = OpenScan::in_memory(segmented, &widest)?;
             let found = adaptive::solve_open_to(&mut scan, target, &recipe.solve, session)?;
-            (found.rows, found.met, scan)
+            (found.met, scan)
         }
         None => {
             let mut scan = OpenScan::in_memory(segmented, &recipe.solve)?;
-            let rows = scan.solve(&recipe.lattice, &recipe.solve, session)?;
-            (rows, true, scan)
+            scan.solve(&recipe.lattice, &recipe.solve, session)?;
+            (true, scan)
         }
     };
     let results = scan.results();
+    let own = results.solved();
+    let rows = with_derived(&own, &own);
     let details = rows
         .iter()
         .map(|row| results.details_of(&row.key))

@@ -124,13 +124,15 @@ def stiffness(
     """
     import numpy as np
 
+    given: dict[str, Any] = dict(settings)
     for key, only in (("load", "stiffness"), ("method", "voxel-fe")):
-        if settings.get(key, only) != only:
-            raise refused(key, f"expected {only}, found {settings[key]}", f"leave {key} out")
-    settings = {**settings, "load": "stiffness", "method": "voxel-fe"}
-    result, matrix = _solved(array, spacing_mm, order, lower, name, threads, progress, settings)
+        if given.setdefault(key, only) != only:
+            raise refused(key, f"expected {only}, found {given[key]}", f"leave {key} out")
+    result, matrix = _solved(array, spacing_mm, order, lower, name, threads, progress, given)
     for key in ("stiffness_mpa", "algebraic_error_mpa"):
         matrix[key] = np.array(matrix[key])
+    # Of the mask's file, and there is none.
+    del matrix["mask_blake3"]
     return {**result, **matrix}
 
 
@@ -159,18 +161,19 @@ def run(
     text = as_json(given)
     if isinstance(scans, (str, os.PathLike)):
         scans = [scans]
-    request: Any = {
+    request: _native.Request = {
         "recipe": os.fspath(recipe),
         "scans": [os.fspath(scan) for scan in scans],
+        "out": "" if out is None else os.fspath(out),
         "jobs": jobs,
         "force": force,
         "progress": progress,
     }
-    if out is not None:
-        said = _native.run({**request, "out": os.fspath(out)}, text)
-    else:
+    if out is None:
         with tempfile.TemporaryDirectory(prefix="bonepd-ct-") as folder:
             said = _native.run({**request, "out": folder}, text)
+    else:
+        said = _native.run(request, text)
     found: dict[str, Any] = json.loads(said)
     _warn(found["warnings"], depth=3)
     return found

@@ -71,11 +71,30 @@ impl Recipe {
     /// `path` only words the errors.
     pub fn parse(text: &str, path: &Path) -> Result<Recipe> {
         let table: toml::Table = text.parse().map_err(|e| not_toml(path, &e))?;
-        let known = serde_json::to_value(Recipe::default()).expect("settings are plain data");
-        refuse_unknown(&table, &known, "", path)?;
+        refuse_unknown(&table, &known(), "", path)?;
         let recipe: Recipe = toml::from_str(text).map_err(|e| not_toml(path, &e))?;
         recipe.check()?;
         Ok(recipe)
+    }
+
+    /// The recipe with other values for some keys, which stand side by side and not in tables. `whose` words the errors.
+    ///
+    /// # Errors
+    /// As [`Recipe::parse`].
+    pub fn with(&self, settings: toml::Table, whose: &Path) -> Result<Recipe> {
+        let known = known();
+        let mut all = toml::Table::try_from(self).expect("settings are plain data");
+        for (key, value) in settings {
+            let own = TABLES.into_iter().find(|name| has(&known[name], &key));
+            let table = match own {
+                Some(name) => all.get_mut(name).and_then(toml::Value::as_table_mut),
+                None if key == "error" => Some(&mut all),
+                None => return Err(unknown_key(&key, &key, &side_by_side(&known), whose)),
+            };
+            table.expect("a recipe has its tables").insert(key, value);
+        }
+        let text = toml::to_string(&all).expect("settings are plain data");
+        Recipe::parse(&text, whose)
     }
 
     /// Refuses values no stage can use.
@@ -115,6 +134,32 @@ impl Recipe {
         };
         self.loads.iter().map(of).collect()
     }
+}
+
+/// Tables of settings of one scan.
+const TABLES: [&str; 3] = ["segment", "lattice", "solve"];
+
+/// All keys of a recipe.
+fn known() -> Value {
+    let mut known = serde_json::to_value(Recipe::default()).expect("settings are plain data");
+    // Where they are not used they are left out.
+    for key in ["plasticity", "element_mm"] {
+        known["solve"][key] = Value::Null;
+    }
+    known
+}
+
+fn has(table: &Value, key: &str) -> bool {
+    table.get(key).is_some()
+}
+
+/// The keys that [`Recipe::with`] takes.
+fn side_by_side(known: &Value) -> Value {
+    let tables = TABLES
+        .into_iter()
+        .filter_map(|name| known[name].as_object());
+    let keys = tables.flat_map(|table| table.clone());
+    keys.chain([("error".to_owned(), Value::Null)]).collect()
 }
 
 fn not_toml(path: &Path, e: &toml::de::Error) -> Error {
@@ -185,6 +230,43 @@ mod tests {
         assert!(words.contains("did you mean `lp_mm`"), "{words}");
         let words = parse("[solver]\n").unwrap_err().to_string();
         assert!(words.contains("did you mean `solve`"), "{words}");
+    }
+
+    #[test]
+    fn keys_that_are_left_out_by_default_are_known() {
+        let recipe = parse("[solve]\nmethod = \"geometry-fe\"\nelement_mm = 0.05").unwrap();
+        assert_eq!(recipe.solve.element_mm, Some(0.05));
+    }
+
+    #[test]
+    fn keys_side_by_side_find_their_tables() {
+        let with = |text: &str| {
+            let settings = text.parse().unwrap();
+            Recipe::default().with(settings, Path::new("the settings"))
+        };
+        let recipe = with("lower = 3.0\nlp_mm = [0.1]\npoisson = 0.2\nelement_mm = 0.1").unwrap();
+        assert_eq!(recipe.segment.lower, Some(3.0));
+        assert_eq!(recipe.lattice.lp_mm, [0.1]);
+        assert_eq!(
+            (recipe.solve.poisson, recipe.solve.element_mm),
+            (0.2, Some(0.1))
+        );
+        assert_eq!(with("error = 0.1").unwrap().error, Some(0.1));
+        for (text, said) in [
+            ("poison = 0.2", "did you mean `poisson`"),
+            ("poisson = \"soft\"", "the settings: not a valid recipe"),
+            ("poisson = 0.5", "poisson"),
+        ] {
+            let words = with(text).unwrap_err().to_string();
+            assert!(words.contains(said), "{words}");
+        }
+        let known = known();
+        let keys = TABLES.map(|name| known[name].as_object().map_or(0, |table| table.len()));
+        let all = side_by_side(&known);
+        assert_eq!(
+            all.as_object().unwrap().len(),
+            1 + keys.iter().sum::<usize>()
+        );
     }
 
     #[test]

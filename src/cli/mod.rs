@@ -21,6 +21,8 @@ use bonepd_ct::error::{Error, Result};
 use bonepd_ct::machine::session::Session;
 use clap::{Args, Parser, Subcommand};
 use serde::Serialize;
+use std::ffi::OsString;
+use std::io::Write;
 
 /// From a μCT scan of trabecular bone to its apparent stiffness, with a stated error.
 ///
@@ -92,10 +94,37 @@ enum Verb {
     Man(man::ManArgs),
 }
 
+/// The program: words in (its own name is the first), exit code out. 0 done; 1 not converged, or some scans failed; 2 usage or
+/// unreadable input.
+pub fn program(words: impl IntoIterator<Item = OsString>) -> u8 {
+    match run(words) {
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::NotConverged) => {
+            put(
+                "warning: not all that was asked for was reached (see the warnings above): the results are written, and their rows say so",
+            );
+            1
+        }
+        Ok(Outcome::SomeFailed(scans)) => {
+            put(&format!("error: failed: {}", scans.join(", ")));
+            1
+        }
+        Err(error) => {
+            put(&format!("error: {error}"));
+            2
+        }
+    }
+}
+
+/// One line on stderr. Nobody may be reading it any more.
+fn put(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
 /// Parses the words and carries out the command. Bad usage ends the process here with clap's message, a hint where there is
 /// one, and exit code 2.
-pub fn run() -> Result<Outcome> {
-    let cli = Cli::try_parse().unwrap_or_else(|error| refuse(error));
+fn run(words: impl IntoIterator<Item = OsString>) -> Result<Outcome> {
+    let cli = Cli::try_parse_from(words).unwrap_or_else(|error| refuse(error));
     if cli.verb.keeps_what_it_finished() {
         bonepd_ct::machine::interrupt::say_how_to_go_on();
     }
@@ -120,7 +149,6 @@ pub fn run() -> Result<Outcome> {
 /// Prints what clap says, help and version among it, and ends the process. Where there is a hint, it stands instead of what
 /// clap guesses from the spelling.
 fn refuse(mut error: clap::Error) -> ! {
-    use std::io::Write;
     let hint = hints::hint(&error);
     if hint.is_some() {
         for kind in hints::GUESSES {
@@ -161,7 +189,6 @@ fn session(shared: &Shared) -> Result<Session> {
 
 /// The result on stdout. A closed pipe is the reader's choice, not an error.
 fn print_json(result: &impl Serialize) {
-    use std::io::Write;
     let text = serde_json::to_string_pretty(result).expect("results are plain data");
     let _ = writeln!(std::io::stdout(), "{text}");
 }

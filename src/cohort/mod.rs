@@ -101,6 +101,7 @@ pub fn cohort(
         |i| run.scan(i),
     );
     run.bar.finish_and_clear();
+    session.stop.obey();
     session.repeated_warnings();
     run.finish(&estimates)
 }
@@ -123,6 +124,9 @@ struct Run<'a> {
 impl Run<'_> {
     /// One scan, whatever happens to it.
     fn scan(&self, i: usize) {
+        if self.session.stop.is_asked() {
+            return;
+        }
         let job = &self.jobs[i];
         let dir = self.out.join(&job.name);
         let own = self.session.logged(&job.name, dir.join("log.txt"));
@@ -133,13 +137,16 @@ impl Run<'_> {
             job.input.display()
         ));
         let before: Vec<Row> = table::read(&dir.join(own_files::RESULTS)).unwrap_or_default();
-        let solved = catch_unwind(AssertUnwindSafe(|| steps(self.recipe, job, &dir, &own)))
-            .unwrap_or_else(|_| {
-                Err(Error::specimen(
-                    "the program failed on this scan (a bug)",
-                    "report it with the scan's log",
-                ))
-            });
+        let solved = catch_unwind(AssertUnwindSafe(|| steps(self.recipe, job, &dir, &own)));
+        if solved.is_err() && self.session.stop.is_asked() {
+            return;
+        }
+        let solved = solved.unwrap_or_else(|_| {
+            Err(Error::specimen(
+                "the program failed on this scan (a bug)",
+                "report it with the scan's log",
+            ))
+        });
         match &solved {
             Ok(Solved { rows, answer }) => {
                 own.note("done");

@@ -195,8 +195,8 @@ impl Climb<'_> {
     }
 
     fn answer(&self) -> Result<()> {
-        if !self.session.dry_run {
-            answer::keep(self.scan.dir(), &self.rows, Some(self.target))?;
+        if let Some(dir) = self.scan.dir().filter(|_| !self.session.dry_run) {
+            answer::keep(dir, &self.rows, Some(self.target))?;
         }
         Ok(())
     }

@@ -13,11 +13,18 @@ use std::path::Path;
 
 /// What segmentation, as its record says, and the solves so far in `dir` left.
 pub fn facts(dir: &Path, record: &SegmentRecord) -> ScanFacts {
-    let results = &record.results;
     ScanFacts {
         targets: answer::targets(dir),
+        ..of_record(record)
+    }
+}
+
+fn of_record(record: &SegmentRecord) -> ScanFacts {
+    let results = &record.results;
+    ScanFacts {
         size_mm: Some([0, 1, 2].map(|a| results.voxels[a] as f64 * results.spacing_mm[a])),
         warnings: results.warnings.clone(),
+        ..ScanFacts::default()
     }
 }
 
@@ -43,6 +50,16 @@ pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answ
         answer::write(dir, &answer)?;
     }
     Ok(answers(&known, &condition, |_| facts.clone()).pop())
+}
+
+/// The answer of a scan in memory, which `rows` are all of; `target` is the relative error asked for. None where no row has a modulus,
+/// force or moment.
+pub fn of_rows(rows: &[Row], record: &SegmentRecord, target: Option<f64>) -> Option<Answer> {
+    let mut facts = of_record(record);
+    if let (Some(target), Some(condition)) = (target, condition(rows)) {
+        facts.targets.set(&condition, target);
+    }
+    answer::answer(rows, &facts)
 }
 
 /// The condition that the answer is of: of several one with a modulus, then the last.

@@ -11,12 +11,14 @@ use crate::volume::Volume;
 use std::path::Path;
 
 /// What was asked for of a solved model.
-pub(super) enum Fields {
+pub enum Fields {
+    /// Nothing.
     None,
     /// Along the specimen's axes, and how those follow from the file's.
     OfVoxels(Vec<FieldVolume>, Turn),
     /// Name of the lattice, values of its sites.
     OfSites(String, SiteFields),
+    /// Of smooth elements.
     OfMesh(MeshFields),
 }
 

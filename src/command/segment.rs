@@ -4,14 +4,15 @@ use crate::draw::picture;
 use crate::error::{Error, Result};
 use crate::format::calibration::GreyUnit;
 use crate::format::orient::Turn;
+use crate::grid::Grid;
 use crate::image::scan::{self, Reading, Scan};
 use crate::io::atomic;
 use crate::machine::session::Session;
 use crate::mask::unmeasured::{self, Hidden};
 use crate::pipeline::segment as stage;
-use crate::pipeline::segment::{SegmentParams, Voi};
+use crate::pipeline::segment::{SegmentParams, SegmentSummary, Voi};
 use crate::record::results;
-use crate::record::specimen;
+use crate::record::specimen::{self, SegmentedScan};
 pub use crate::record::specimen::{Input, SegmentRecord};
 use crate::volume::{Specimen, Volume};
 use rayon::prelude::*;
@@ -55,28 +56,8 @@ pub fn segment(
             (blake3?, whole?)
         }
     };
-    let scan = &whole.scan;
-    let mut segmented = whole.segmented(params)?;
-    let warnings = &mut segmented.summary.warnings;
-    warnings.extend(scan.warnings.iter().cloned());
-    warnings.extend(threshold_in_counts(scan, params));
-    warnings.extend(values_out_of_unit(scan, params));
-    let record = SegmentRecord {
-        program: env!("CARGO_PKG_NAME").into(),
-        version: env!("CARGO_PKG_VERSION").into(),
-        scan: scan.name.clone(),
-        input: Input {
-            path: input.to_path_buf(),
-            blake3,
-            voi_blake3,
-            format: scan.format.clone(),
-            unit: scan.unit.clone(),
-            axes: axes(scan, params),
-            notes: scan.notes.clone(),
-        },
-        settings: params.clone(),
-        results: segmented.summary,
-    };
+    let segmented = whole.segmented(params)?;
+    let record = whole.record(params, segmented.summary, blake3, voi_blake3);
     say(&record, session);
     if !session.dry_run {
         write(dir, &record, &segmented.scan, &segmented.specimen)?;
@@ -117,6 +98,41 @@ pub fn in_memory(
     Ok(whole.segmented(params)?.specimen)
 }
 
+/// Segments values in memory, x fastest, of `n` voxels along x, y, z; nothing is written. `params` have the voxel size, and the
+/// volume of interest unless that is the mask `voi` on the same voxels.
+///
+/// # Errors
+/// As [`segment`].
+pub fn of_values(
+    (n, values): ([usize; 3], Vec<f32>),
+    voi: Option<Vec<u8>>,
+    name: &str,
+    params: &SegmentParams,
+    session: &Session,
+) -> Result<SegmentedScan> {
+    params.check()?;
+    if params.raw.is_some() || params.units.is_some() {
+        return Err(Error::setting(
+            "raw, units",
+            "they say how a file is read, and these values are in memory",
+            "leave them out",
+        ));
+    }
+    let spacing_mm = params.spacing_mm.ok_or_else(|| {
+        let advice = "give it in millimetres (for example 0.0195)";
+        Error::setting("spacing_mm", "an array has no voxel size", advice)
+    })?;
+    let grid = Grid::new(n, spacing_mm);
+    let voi = voi.map(|voxels| Volume::from_vec(grid, voxels));
+    let scan = scan::of_values(name, Volume::from_vec(grid, values));
+    let whole = whole(scan, voi, params, session)?;
+    let segmented = whole.segmented(params)?;
+    let specimen = segmented.specimen;
+    let record = whole.record(params, segmented.summary, String::new(), None);
+    say(&record, session);
+    Ok(SegmentedScan::in_memory(specimen, record))
+}
+
 /// A scan that was read, and what goes with it.
 struct Whole {
     scan: Scan,
@@ -136,6 +152,37 @@ impl Whole {
             self.hidden.as_ref(),
         )
     }
+
+    /// What was segmented, how, and what came out.
+    fn record(
+        &self,
+        params: &SegmentParams,
+        mut summary: SegmentSummary,
+        blake3: String,
+        voi_blake3: Option<String>,
+    ) -> SegmentRecord {
+        let scan = &self.scan;
+        let warnings = &mut summary.warnings;
+        warnings.extend(scan.warnings.iter().cloned());
+        warnings.extend(threshold_in_counts(scan, params));
+        warnings.extend(values_out_of_unit(scan, params));
+        SegmentRecord {
+            program: env!("CARGO_PKG_NAME").into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            scan: scan.name.clone(),
+            input: Input {
+                path: scan.path.clone(),
+                blake3,
+                voi_blake3,
+                format: scan.format.clone(),
+                unit: scan.unit.clone(),
+                axes: axes(scan, params),
+                notes: scan.notes.clone(),
+            },
+            settings: params.clone(),
+            results: summary,
+        }
+    }
 }
 
 fn read(
@@ -145,11 +192,22 @@ fn read(
     session: &Session,
 ) -> Result<Whole> {
     let mut scan = scan::read_as(input, &reading(params))?;
-    stage::refuse_impossible_voxels(scan.volume.grid.spacing_mm)?;
     if let Some(name) = name {
         scan.name = name.to_owned();
     }
+    whole(scan, None, params, session)
+}
+
+/// The scan with all that its segmentation takes; `voi` is its volume of interest where that was read before.
+fn whole(
+    mut scan: Scan,
+    voi: Option<Volume<u8>>,
+    params: &SegmentParams,
+    session: &Session,
+) -> Result<Whole> {
+    stage::refuse_impossible_voxels(scan.volume.grid.spacing_mm)?;
     let voi_mask = match &params.voi {
+        _ if voi.is_some() => voi,
         Voi::Mask(path) => {
             let mut notes = Vec::new();
             let mask = stage::laid::on(&scan, path, &mut notes)?;

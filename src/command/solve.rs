@@ -1,8 +1,9 @@
-//! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each.
+//! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each; and the same in memory.
 
 mod kept_steps;
 
-use crate::command::fields::Fields;
+#[doc(hidden)]
+pub use crate::command::fields::Fields;
 use crate::command::in_words::{in_words, sections_in_words};
 use crate::command::lattice::binned;
 use crate::command::{estimate, stiffness};
@@ -16,6 +17,7 @@ use crate::machine::session::Session;
 use crate::measure::morphometry::Morphometry;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::pipeline::apparent::discretisation::Prepared;
+use crate::pipeline::apparent::discretisation::yielded::Kept;
 use crate::pipeline::apparent::fields::Recorded;
 use crate::pipeline::apparent::job::{Job, JobResult};
 use crate::pipeline::apparent::tissue::Tissue;
@@ -24,6 +26,7 @@ use crate::pipeline::lattice::LatticeParams;
 use crate::record::details;
 use crate::record::results::{self, Results};
 use crate::record::specimen::{self, SegmentedScan};
+use crate::record::stiffness::StiffnessRecord;
 use crate::result::cautions;
 use crate::result::derived::with_derived;
 use crate::result::details::Details;
@@ -36,12 +39,13 @@ use crate::result::voxel_check;
 use crate::solver::cg::CgStep;
 use crate::volume::{Specimen, Volume};
 use indicatif::ProgressBar;
-use kept_steps::KeptSteps;
+use kept_steps::{KeptSteps, StepsInMemory};
 use std::path::{Path, PathBuf};
 
 /// A segmented scan opened for solves: its mask is read, hashed and measured once for all of them.
 pub struct OpenScan {
-    dir: PathBuf,
+    /// None: the scan is in memory alone.
+    dir: Option<PathBuf>,
     specimen: Specimen,
     tissue: Tissue,
     results: Results,
@@ -53,6 +57,18 @@ pub struct OpenScan {
     /// From the order of the files of voxels to x, y, z of the results.
     axes: Turn,
     image: Image,
+    in_memory: InMemory,
+}
+
+/// What solves of a scan in memory leave in addition to their rows, in the order of the solves.
+#[derive(Default)]
+pub struct InMemory {
+    /// With the row's settings each.
+    #[doc(hidden)]
+    pub fields: Vec<(Settings, Fields)>,
+    /// The last apparent stiffness.
+    #[doc(hidden)]
+    pub stiffness: Option<StiffnessRecord>,
 }
 
 /// A row with its fields, and whether it was kept from an earlier solve.
@@ -90,20 +106,51 @@ impl OpenScan {
             atomic::sweep(dir);
         }
         results::keep_other_version(dir, session);
-        let scan = loaded(dir, params)?;
+        let mut scan = loaded(dir, params)?;
+        let record = std::mem::take(&mut scan.record_json);
+        let results = Results::open(dir, &scan.mask_blake3, record, redo);
+        Self::of(scan, params, results, Some(dir))
+    }
+
+    /// Opens a scan that was segmented in memory; its solves write nothing.
+    ///
+    /// # Errors
+    /// A material that does not fit the scan.
+    #[doc(hidden)]
+    pub fn in_memory(mut scan: SegmentedScan, params: &SolveParams) -> Result<Self> {
+        if !params.needs_grey() {
+            (scan.specimen.grey, scan.specimen.threshold) = (None, None);
+        }
+        let record = std::mem::take(&mut scan.record_json);
+        let results = Results::in_memory(&scan.mask_blake3, record);
+        Self::of(scan, params, results, None)
+    }
+
+    fn of(
+        scan: SegmentedScan,
+        params: &SolveParams,
+        results: Results,
+        dir: Option<&Path>,
+    ) -> Result<Self> {
         let image = scan.image();
         let (specimen, measured) = (scan.specimen, scan.record.results);
         Ok(OpenScan {
             tissue: Tissue::of(&specimen, params)?,
-            results: Results::open(dir, &scan.mask_blake3, scan.record_json, redo),
+            results,
             plate_thickness_mm: plate_thickness_mm(&specimen.bone),
             strut_thickness_mm: measured.mean_thickness_mm,
             morphometry: measured.morphometry,
-            dir: dir.to_path_buf(),
+            dir: dir.map(Path::to_path_buf),
             axes: scan.record.input.axes,
             image,
             specimen,
+            in_memory: InMemory::default(),
         })
+    }
+
+    /// What the solves of a scan in memory left so far; it is taken out.
+    pub fn take_in_memory(&mut self) -> InMemory {
+        std::mem::take(&mut self.in_memory)
     }
 
     /// The mask, with the grey values where the settings need them.
@@ -120,9 +167,9 @@ impl OpenScan {
         }
     }
 
-    /// The scan's folder.
-    pub fn dir(&self) -> &Path {
-        &self.dir
+    /// The scan's folder; None where it is in memory alone.
+    pub fn dir(&self) -> Option<&Path> {
+        self.dir.as_deref()
     }
 
     /// What the scan says of the surface within a voxel.
@@ -205,11 +252,16 @@ impl OpenScan {
                 Some(details) => details.curve.clone(),
             };
             self.results.store(blank, params, &row, details)?;
-            if !curve.is_empty() {
-                details::write_curve(&self.dir, &curve)?;
-                kept_steps::forget(&self.dir);
+            match &self.dir {
+                None => self.in_memory.fields.push((row.key.clone(), fields)),
+                Some(dir) => {
+                    if !curve.is_empty() {
+                        details::write_curve(dir, &curve)?;
+                        kept_steps::forget(dir);
+                    }
+                    fields.write(dir)?;
+                }
             }
-            fields.write(&self.dir)?;
             rows.push(row);
         }
         let known = self.results.solved();
@@ -236,7 +288,7 @@ impl OpenScan {
 
     /// The row that was kept, or its solve; None where the session only says what it would do.
     fn row(
-        &self,
+        &mut self,
         job: &Job,
         blank: &Row,
         params: &SolveParams,
@@ -247,9 +299,11 @@ impl OpenScan {
             tissue: &self.tissue,
         };
         // Fields are written over by the next solve: whether those there are these is not known.
-        let kept = params.fields.is_empty()
-            && (params.load != Load::Stiffness
-                || stiffness::is_current(&self.dir, params, self.results.mask_blake3()));
+        let has_matrix = || {
+            let dir = self.dir.as_deref();
+            dir.is_some_and(|dir| stiffness::is_current(dir, params, self.results.mask_blake3()))
+        };
+        let kept = params.fields.is_empty() && (params.load != Load::Stiffness || has_matrix());
         if let Some(row) = self.results.find(blank, params).filter(|_| kept) {
             return Ok(Some(Made {
                 row,
@@ -271,7 +325,7 @@ impl OpenScan {
     }
 
     fn solve_job(
-        &self,
+        &mut self,
         job: &Job,
         blank: &Row,
         params: &SolveParams,
@@ -288,11 +342,17 @@ impl OpenScan {
         );
         bar.set_message("building the model and its multigrid");
         let loads = if params.load == Load::Stiffness { 6 } else { 1 };
-        let mut kept = KeptSteps::new(&self.dir, self.results.fingerprint(blank, params), session);
+        let of_this = || self.results.fingerprint(blank, params);
+        let mut kept: Box<dyn Kept> = match &self.dir {
+            Some(dir) => Box::new(KeptSteps::new(dir, of_this(), session)),
+            None => Box::new(StepsInMemory(session)),
+        };
         let memory = &estimate::FreeMemory::now();
-        let solution = job.solve(prepared, params, memory, &mut kept, &mut |load, step| {
+        let solution = job.solve(prepared, params, memory, &mut *kept, &mut |load, step| {
+            session.stop.obey();
             show(&bar, [load, loads], step, params.tolerance);
         })?;
+        drop(kept);
         bar.finish_and_clear();
         let (row, details, fields) = match solution {
             JobResult::Modulus(solved, mut recorded) => {
@@ -309,8 +369,11 @@ impl OpenScan {
             JobResult::Stiffness(solved) => {
                 let mask_blake3 = self.results.mask_blake3();
                 let record = stiffness::record(&solved, &self.specimen, params, mask_blake3);
-                stiffness::write(&self.dir, &record, session)?;
                 let row = stiffness::row(&solved, params, blank);
+                match &self.dir {
+                    Some(dir) => stiffness::write(dir, &record, session)?,
+                    None => self.in_memory.stiffness = Some(record),
+                }
                 (row, Details::default(), Fields::None)
             }
         };

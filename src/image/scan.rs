@@ -116,6 +116,25 @@ pub fn read_as(path: &Path, reading: &Reading) -> Result<Scan> {
     })
 }
 
+/// A scan that no file holds, axes as they are.
+pub fn of_values(name: &str, volume: Volume<f32>) -> Scan {
+    Scan {
+        name: name.to_owned(),
+        path: PathBuf::from(name),
+        format: "values in memory".to_owned(),
+        unit: None,
+        calibration: None,
+        volume,
+        turn: Turn::default(),
+        padding: None,
+        file_spacing_mm: None,
+        file_affine: None,
+        details: Vec::new(),
+        notes: Vec::new(),
+        warnings: Vec::new(),
+    }
+}
+
 /// Values of a file that this program wrote on the grid of a scan, brought to the axes that `turn` made of the stored
 /// ones. `spacing_mm` is the voxel size along the turned axes.
 pub fn read_turned(path: &Path, turn: &Turn, spacing_mm: [f64; 3]) -> Result<Volume<f32>> {

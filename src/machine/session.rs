@@ -1,6 +1,7 @@
 //! Owns what all commands share: how loud, how many threads, whether to redo or only to say what would be done; and where
 //! words go: results to stdout, everything else to stderr.
 
+use crate::machine::interrupt::Stop;
 use crate::machine::log::Log;
 use crate::result::notes::Alikes;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -28,6 +29,8 @@ pub struct Session {
     pub scan: Option<String>,
     /// Other scans are worked on at the same time: the process's memory is not this one's.
     pub shares_process: bool,
+    /// Seen at each iteration of a solver: whether to stop.
+    pub stop: Stop,
     /// Where words go other than the terminal.
     pub output: Output,
 }
@@ -42,9 +45,35 @@ pub struct Output {
     log: Option<Arc<Mutex<Log>>>,
     /// Warnings of a run so far: one that says the same of another scan waits for the end.
     warned: Option<Arc<Mutex<Alikes>>>,
+    /// Of a program that calls the library: its warnings, which the terminal does not show.
+    told: Option<Arc<Mutex<Vec<String>>>>,
 }
 
 impl Session {
+    /// The session of a program that calls the library: nothing is printed but progress, if `bars`. [`Session::warnings`] has the
+    /// warnings.
+    pub fn of_caller(bars: bool) -> Session {
+        Session {
+            quiet: true,
+            json: true,
+            output: Output {
+                bars_shown: Some(bars),
+                told: Some(Arc::default()),
+                ..Output::default()
+            },
+            ..Session::default()
+        }
+    }
+
+    /// The warnings so far of a session of [`Session::of_caller`]; of any other there are none.
+    pub fn warnings(&self) -> Vec<String> {
+        let told = self.output.told.as_ref();
+        told.map_or(Vec::new(), |told| {
+            let told = told.lock().expect("no one panics while adding a line");
+            told.clone()
+        })
+    }
+
     /// The session of one scan of a run: its words go to `file`, warnings to the terminal too.
     pub fn logged(&self, scan: &str, file: PathBuf) -> Session {
         Session {
@@ -78,8 +107,8 @@ impl Session {
         let warned = warned.lock().expect("no one panics while adding a line");
         let repeated = warned.groups().filter(|alike| alike.scans.len() > 1);
         for alike in repeated {
-            self.put(&format!(
-                "warning: of {} scans ({}): {}",
+            self.put_warning(format!(
+                "of {} scans ({}): {}",
                 alike.scans.len(),
                 shortened(&alike.scans),
                 alike.of_all()
@@ -135,7 +164,17 @@ impl Session {
             }
         }
         let scan = scan.map_or(String::new(), |s| format!("{s}: "));
-        self.put(&format!("warning: {scan}{line}"));
+        self.put_warning(format!("{scan}{line}"));
+    }
+
+    fn put_warning(&self, line: String) {
+        match &self.output.told {
+            Some(told) => {
+                let mut told = told.lock().expect("no one panics while adding a line");
+                told.push(line);
+            }
+            None => self.put(&format!("warning: {line}")),
+        }
     }
 
     /// What a user should know of how `scan` was understood.

@@ -157,7 +157,8 @@ fn is_empty(details: &Details) -> bool {
 
 /// The rows of one scan's folder.
 pub struct Results {
-    dir: PathBuf,
+    /// None: they are kept in memory alone.
+    dir: Option<PathBuf>,
     record: Record,
     /// Where solves are to be made again: keys of those that were.
     redone: Option<BTreeSet<String>>,
@@ -178,9 +179,22 @@ impl Results {
         // Means are computed again from what was solved.
         rows.retain(|row| row.key.is_some());
         Results {
-            dir: dir.to_path_buf(),
+            dir: Some(dir.to_path_buf()),
             record: Record { provenance, rows },
             redone: redo.then(BTreeSet::new),
+        }
+    }
+
+    /// Results that no folder holds, of the mask of this hash, which `segment` says how to make.
+    pub fn in_memory(mask_blake3: &str, segment: Value) -> Self {
+        let provenance = Provenance::now(mask_blake3, segment);
+        Results {
+            dir: None,
+            record: Record {
+                provenance,
+                rows: Vec::new(),
+            },
+            redone: None,
         }
     }
 
@@ -279,6 +293,12 @@ impl Results {
         }
     }
 
+    /// The details of the solved row with these settings; none where there is no such row.
+    pub fn details_of(&self, settings: &Settings) -> Details {
+        let found = self.record.rows.iter().find(|own| own.row.key == *settings);
+        found.map_or_else(Details::default, |own| own.details.clone())
+    }
+
     /// BLAKE3 of the mask that the results are of.
     pub fn mask_blake3(&self) -> &str {
         &self.record.provenance.mask_blake3
@@ -291,6 +311,9 @@ impl Results {
     }
 
     fn write(&self) -> Result<()> {
+        let Some(dir) = &self.dir else {
+            return Ok(());
+        };
         let solved = self.solved();
         let rows = with_derived(&solved, &solved);
         let mut solved = self.record.rows.iter();
@@ -311,13 +334,10 @@ impl Results {
             rows: rows.iter().map(keyed).collect(),
         };
         let text = serde_json::to_string_pretty(&record).expect("plain data");
-        atomic::write(&self.dir.join(RECORD), text)?;
+        atomic::write(&dir.join(RECORD), text)?;
         let details = self.record.rows.iter();
-        details::write(
-            &self.dir,
-            details.map(|keyed| (&keyed.row.key, &keyed.details)),
-        )?;
-        write_table(&self.dir, &rows)
+        details::write(dir, details.map(|keyed| (&keyed.row.key, &keyed.details)))?;
+        write_table(dir, &rows)
     }
 }
 

@@ -134,6 +134,19 @@ pub fn load(dir: &Path) -> Result<SegmentedScan> {
 }
 
 impl SegmentedScan {
+    /// A scan that was segmented in memory, with the grey values that the record's settings keep.
+    pub fn in_memory(mut specimen: Specimen, record: SegmentRecord) -> SegmentedScan {
+        if specimen.grey.is_none() {
+            specimen.threshold = None;
+        }
+        SegmentedScan {
+            record_json: serde_json::to_value(&record).expect("records are plain data"),
+            mask_blake3: blake3::hash(specimen.bone.as_slice()).to_hex().to_string(),
+            specimen,
+            record,
+        }
+    }
+
     /// What is known of the surface within a voxel.
     pub fn image(&self) -> Image {
         let results = &self.record.results;

@@ -153,10 +153,11 @@ fn options(text: &str) -> Vec<&str> {
 }
 
 /// Programs whose own options stand in the pages: their lines are left out.
-const OTHERS: [&str; 7] = [
+const OTHERS: [&str; 8] = [
     "cargo",
     "chromium",
     "git ",
+    "pip ",
     "python3",
     "snakemake",
     "sbatch",

@@ -58,7 +58,22 @@ impl Kept for KeptSteps<'_> {
     }
 
     fn keep(&mut self, history: &History) -> Result<()> {
+        self.session.stop.obey();
         state::write(&self.path, &self.fingerprint, &kept(history))
+    }
+}
+
+/// Steps of a scan in memory: nobody keeps them, but between them a solve may be stopped.
+pub struct StepsInMemory<'a>(pub &'a Session);
+
+impl Kept for StepsInMemory<'_> {
+    fn resume(&mut self) -> Option<History> {
+        None
+    }
+
+    fn keep(&mut self, _: &History) -> Result<()> {
+        self.0.stop.obey();
+        Ok(())
     }
 }
 

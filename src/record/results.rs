@@ -43,7 +43,10 @@ pub fn set_aside_stale(dir: &Path, session: &Session) {
     if session.dry_run {
         return;
     }
-    let (Some(old), Ok(mask)) = (Record::read(dir), std::fs::read(dir.join(specimen::MASK))) else {
+    let Some(old) = Record::read(dir) else {
+        return;
+    };
+    let Ok(mask) = std::fs::read(dir.join(specimen::MASK)) else {
         return;
     };
     let now = blake3::hash(&mask).to_hex();

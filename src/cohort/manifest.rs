@@ -189,7 +189,7 @@ fn job<'a>(
         let word = cell(column);
         word.map(|word| parsed(word, column, delimiter)).transpose()
     };
-    let input = named::beside(folder, cell("path").ok_or("no path")?);
+    let input = named::in_folder(folder, cell("path").ok_or("no path")?);
     let mut segment = params.clone();
     let (lower, upper) = (number("lower")?, number("upper")?);
     if lower.is_some() || upper.is_some() {

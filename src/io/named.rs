@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-/// The file of this name beside `folder`'s other files. Names that Windows wrote (`scans\p01.nii.gz`) are understood
-/// everywhere: where there is no such file, backslashes divide folders.
-pub fn beside(folder: &Path, name: impl AsRef<Path>) -> PathBuf {
+/// The file of this name, as seen from `folder`. Names that Windows wrote (`scans\p01.nii.gz`) are understood everywhere:
+/// where there is no such file, backslashes divide folders.
+pub fn in_folder(folder: &Path, name: impl AsRef<Path>) -> PathBuf {
     let path = folder.join(&name);
     let divided = name.as_ref().to_str().map(|name| name.replace('\\', "/"));
     let other = divided.map(|name| folder.join(name));
@@ -24,10 +24,10 @@ mod tests {
         std::fs::create_dir(dir.path().join("scans")).unwrap();
         let file = dir.path().join("scans/a.nii");
         std::fs::write(&file, "x").unwrap();
-        let found = beside(dir.path(), "scans\\a.nii");
+        let found = in_folder(dir.path(), "scans\\a.nii");
         assert_eq!(found.canonicalize().unwrap(), file.canonicalize().unwrap());
-        assert_eq!(beside(dir.path(), "scans/a.nii"), file);
+        assert_eq!(in_folder(dir.path(), "scans/a.nii"), file);
         let absent = dir.path().join("b\\c.nii");
-        assert_eq!(beside(dir.path(), "b\\c.nii"), absent);
+        assert_eq!(in_folder(dir.path(), "b\\c.nii"), absent);
     }
 }

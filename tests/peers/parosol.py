@@ -39,7 +39,7 @@ def tool(*words):
     return done.stdout
 
 
-# Four ranks on fewer cores, and as root in a container: Open MPI asks to be told.
+# Four ranks on fewer cores, and as root in a container: Open MPI does neither unasked.
 os.environ.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
                   OMPI_MCA_mpi_yield_when_idle="1")
 

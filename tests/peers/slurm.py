@@ -40,7 +40,7 @@ def missing():
     if tools:
         return f"no {', '.join(tools)}; apt-get install slurm-wlm munge"
     if not SNAKEMAKE.exists():
-        return "no snakemake beside this python; pip install snakemake snakemake-executor-plugin-slurm"
+        return "no snakemake for this python; pip install snakemake snakemake-executor-plugin-slurm"
     if os.geteuid():
         return "Slurm's daemons ask for root"
     return None

@@ -17,12 +17,12 @@ pub fn read(scene: &mut Scene, folder: &Path, say: impl Fn(String)) -> Result<In
     match &mut scene.setting.geometry {
         Geometry::Polygon(polygon) => {
             if let Some(file) = &polygon.file {
-                polygon.corners = points::read_corners(&named::beside(folder, file))?;
+                polygon.corners = points::read_corners(&named::in_folder(folder, file))?;
             }
             Ok(Inputs::default())
         }
         Geometry::Image(image) => {
-            let (n, values) = map::read_brightness(&named::beside(folder, &image.file))?;
+            let (n, values) = map::read_brightness(&named::in_folder(folder, &image.file))?;
             let inside = values.iter().map(|v| *v >= 0.5).collect();
             Ok(Inputs {
                 bitmap: Some(Bitmap { n, inside }),
@@ -31,10 +31,10 @@ pub fn read(scene: &mut Scene, folder: &Path, say: impl Fn(String)) -> Result<In
             })
         }
         Geometry::Slice(slice) => {
-            let mask = read_section(&named::beside(folder, &slice.file), slice)?;
+            let mask = read_section(&named::in_folder(folder, &slice.file), slice)?;
             let grey = match &slice.grey {
                 Some(file) => {
-                    let path = named::beside(folder, file);
+                    let path = named::in_folder(folder, file);
                     let grey = read_section(&path, slice)?;
                     mask.require_alike(&grey, &path)?;
                     Some(grey.values)
@@ -68,7 +68,7 @@ pub fn read_stiffness(scene: &Scene, folder: &Path) -> Result<Option<[[f64; 6]; 
     };
     match model.problem.elasticity().map(|e| &e.material) {
         Some(Material::FromScan { scan, .. }) => {
-            stiffness::read(&named::beside(folder, &scan.file)).map(Some)
+            stiffness::read(&named::in_folder(folder, &scan.file)).map(Some)
         }
         _ => Ok(None),
     }

@@ -49,7 +49,7 @@ pub fn files(header: &Header, path: &Path) -> Result<Vec<PathBuf>> {
     let folder = path.parent().unwrap_or(Path::new("."));
     Ok(names
         .iter()
-        .map(|name| named::beside(folder, name))
+        .map(|name| named::in_folder(folder, name))
         .collect())
 }
 

@@ -29,6 +29,26 @@
 //! # }
 //! ```
 //!
+//! Every failure is an [`error::Error`]. Its kind says what is wrong: a file, a setting (by its key), or a specimen that the request makes no
+//! sense for. Each kind has words on what was found and what to do, and where the error of another library is behind it, that error is its
+//! `source`. Kinds may be added. A solve that does not converge is no error: its row says so.
+//!
+//! ```
+//! use bonepd_ct::command::info::info;
+//! use bonepd_ct::error::Error;
+//! use std::error::Error as _;
+//!
+//! match info("missing.nii.gz".as_ref()) {
+//!     Err(Error::File { path, .. }) => println!("another path than {}?", path.display()),
+//!     Err(Error::Setting { key, advice, .. }) => println!("{key}: {advice}"),
+//!     Err(other) => println!("{other}"),
+//!     Ok(scan) => println!("{}", scan.format),
+//! }
+//! let error = info("missing.nii.gz".as_ref()).expect_err("no such file");
+//! let behind = error.source().and_then(|e| e.downcast_ref::<std::io::Error>());
+//! assert_eq!(behind.map(|e| e.kind()), Some(std::io::ErrorKind::NotFound));
+//! ```
+//!
 //! Layers, lowest first. A file imports from lower layers only, or from its own folder;
 //! `tests/layers.rs` holds the code to it.
 //!

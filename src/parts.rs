@@ -10,6 +10,7 @@ pub fn apart(n: usize) -> Vec<u32> {
 }
 
 /// The root of the set of `i`.
+#[inline]
 pub fn root(up: &mut [u32], mut i: u32) -> u32 {
     while up[i as usize] != i {
         up[i as usize] = up[up[i as usize] as usize];
@@ -19,6 +20,7 @@ pub fn root(up: &mut [u32], mut i: u32) -> u32 {
 }
 
 /// Makes one set of those of `a` and `b`.
+#[inline]
 pub fn join(up: &mut [u32], a: u32, b: u32) {
     let (a, b) = (root(up, a), root(up, b));
     up[a.max(b) as usize] = a.min(b);

@@ -63,6 +63,7 @@ impl Recipe {
                 format!("expected a recipe, could not read it: {found}"),
                 format!("name a TOML file with tables [segment], [lattice], [solve], [report], before the scans; or a recipe in the program: {} (`bonepd-ct recipe NAME` prints one)", built_in::names()),
             )
+            .caused_by(e)
         })?;
         Recipe::parse(&text, path)
     }

@@ -292,7 +292,11 @@ fn recipes_and_columns_are_printed() {
     let (_, one, _) = run(&["columns", "failed.csv", "--json"]);
     let one: serde_json::Value = serde_json::from_str(&one).unwrap();
     assert_eq!(one[0]["columns"][0]["name"], "scan");
-    assert_eq!(run(&["columns", "other.csv"]).0, 2);
+    let (code, _, refusal) = run(&["columns", "segment.json"]);
+    assert_eq!(code, 2);
+    for known in ["results.csv", "answers.csv", "history.csv"] {
+        assert!(refusal.contains(known), "{refusal}");
+    }
 }
 
 /// A recipe in the program is taken by its name where no file has it.

@@ -10,10 +10,11 @@ use bonepd_ct::operator::sparse::Sparse;
 use bonepd_ct::physics::hex8::element::Integration;
 use bonepd_ct::physics::hex8::heterogeneous::Heterogeneous;
 use bonepd_ct::pipeline::apparent::ends::motion::EndMotion;
+use bonepd_ct::pipeline::apparent::ends::supports;
 use bonepd_ct::pipeline::apparent::solve_lattice;
 use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::solved::Solved;
-use bonepd_ct::pipeline::apparent::voxel_fe::supports;
+use bonepd_ct::pipeline::apparent::voxel_fe::nodes::Gripped;
 use bonepd_ct::pipeline::apparent::{Ends, SolveParams};
 use bonepd_ct::pipeline::lattice::{Boundary, Case as LatticeCase, Structure};
 use bonepd_ct::solver::amg::{Amg, AmgParams};
@@ -426,8 +427,9 @@ fn contrast(soft: f32) -> (usize, f64, f64) {
         ..poisson(0.3)
     };
     let motion = EndMotion::of(&specimen, &stretched, length);
-    let held = supports::held(&mesh, grips, &motion, stretched.load);
-    let start = supports::start(&mesh, grips, &motion);
+    let nodes = Gripped { mesh: &mesh, grips };
+    let held = supports::held(&nodes, &motion, stretched.load);
+    let start = supports::start(&nodes, &motion);
     let factor = |e: usize| if bone[e] == 1 { 1.0 } else { soft };
     let model = Heterogeneous::new(mesh, 1000.0, 0.3, Integration::Full, factor);
     let amg = Amg::new(&model, &held, &AmgParams::new(grid.spacing_mm));

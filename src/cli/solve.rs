@@ -4,7 +4,8 @@ use super::settings::overrides::lay_over;
 use super::settings::{LatticeSettings, TissueSettings};
 use super::{print_json, words};
 use crate::cli::words::law;
-use bonepd_ct::command::{Outcome, run_settings};
+use bonepd_ct::command::in_words::answer_in_words;
+use bonepd_ct::command::{Outcome, answer, run_settings};
 use bonepd_ct::error::{Error, Result};
 use bonepd_ct::export::tetrahedra::Kind;
 use bonepd_ct::grid::Axis;
@@ -13,6 +14,7 @@ use bonepd_ct::physics::plasticity::Plasticity;
 use bonepd_ct::pipeline::apparent::checks::needs_modulus;
 use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams};
+use bonepd_ct::result::answer::AnswerLine;
 use bonepd_ct::result::row::Row;
 use clap::Args;
 use serde::Serialize;
@@ -230,7 +232,9 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
         }
     };
     if !session.dry_run {
-        say_where_another_answers(&args.dir, &rows, args.error, session)?;
+        let kept = answer::keep(&args.dir, &rows, args.error)?;
+        kept.iter()
+            .for_each(|answer| say_where_another_answers(answer, &rows, session));
     }
     if json {
         print_json(&rows);
@@ -243,27 +247,17 @@ pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     )
 }
 
-/// Keeps the answer of the scan, and says so where a row of an earlier solve stays its answer.
-fn say_where_another_answers(
-    dir: &Path,
-    rows: &[Row],
-    target: Option<f64>,
-    session: &Session,
-) -> Result<()> {
-    use bonepd_ct::command::{answer, in_words::answer_in_words};
-    answer::keep(dir, rows, target)?;
-    let Some(line) = answer::line(dir, rows)? else {
-        return Ok(());
-    };
-    let is_own = |row: &Row| row.e_app_mpa() == line.e_app_mpa && row.key.lp_mm == line.element_mm;
-    if line.e_app_mpa.is_some() && !rows.iter().any(is_own) {
+/// Says so where a row of an earlier solve stays the answer of the scan.
+fn say_where_another_answers(answer: &AnswerLine, rows: &[Row], session: &Session) {
+    let is_own =
+        |row: &Row| row.e_app_mpa() == answer.e_app_mpa && row.key.lp_mm == answer.element_mm;
+    if answer.e_app_mpa.is_some() && !rows.iter().any(is_own) {
         session.result(format!(
             "the answer of {} stays that of an earlier solve: {}",
-            line.scan,
-            answer_in_words(&line)
+            answer.scan,
+            answer_in_words(answer)
         ));
     }
-    Ok(())
 }
 
 fn export(

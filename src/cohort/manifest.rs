@@ -42,7 +42,8 @@ pub fn read(path: &Path, params: &SegmentParams) -> Result<Manifest> {
             ),
         )
     };
-    let text = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let text =
+        std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")).caused_by(e))?;
     if let Err(e) = std::str::from_utf8(&text) {
         let line = 1 + text[..e.valid_up_to()]
             .iter()

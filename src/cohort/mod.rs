@@ -11,7 +11,7 @@ pub mod queue;
 pub mod scans;
 
 use crate::cohort::job::ScanJob;
-use crate::cohort::outcome::{ScanResult, State, in_words, outcome, result, said_of_kept};
+use crate::cohort::outcome::{ScanResult, Solved, State, in_words, outcome, result, said_of_kept};
 use crate::cohort::scans::Selection;
 use crate::command::estimate::{Estimate, estimate};
 use crate::command::solve::OpenScan;
@@ -116,7 +116,7 @@ struct Run<'a> {
     session: &'a Session,
     bar: ProgressBar,
     /// By scan, in the order of the inputs.
-    done: Mutex<Vec<Option<Result<Vec<Row>>>>>,
+    done: Mutex<Vec<Option<Result<Solved>>>>,
     /// All rows in the folders of the scans that are done, by name.
     tables: Mutex<HashMap<String, Vec<Row>>>,
 }
@@ -148,12 +148,12 @@ impl Run<'_> {
             ))
         });
         match &solved {
-            Ok(rows) => {
+            Ok(Solved { rows, answer }) => {
                 own.note("done");
                 let place = format!("{} ({} of {})", job.name, i + 1, self.jobs.len());
                 self.session.result(format!(
                     "{place}: {}{}",
-                    in_words(rows, answer::line(&dir, rows).ok().flatten().as_ref()),
+                    in_words(rows, answer.as_ref()),
                     said_of_kept(rows, &before)
                 ));
             }
@@ -183,7 +183,7 @@ impl Run<'_> {
     }
 
     /// All rows so far, in the order of the scans: all that the folders of the scans hold, also of earlier runs.
-    fn write_rows(&self, done: &[Option<Result<Vec<Row>>>]) -> Result<Vec<Row>> {
+    fn write_rows(&self, done: &[Option<Result<Solved>>]) -> Result<Vec<Row>> {
         let mut rows = Vec::new();
         let mut tables = self.tables.lock().expect("tables are read without panic");
         for name in &self.names {
@@ -248,14 +248,15 @@ impl Run<'_> {
         } else {
             let recipe = self.write_recipe()?;
             let dirs = [self.out.to_path_buf()];
-            let answers = report::answers(&rows, &dirs);
+            let folders = &report::Folders::of(&rows, &dirs);
+            let answers = report::answers(&rows, folders);
             table::write(&self.out.join(own_files::ANSWERS), &answers.lines)?;
             let sources = report::Sources {
                 rows: &rows,
                 answers,
                 failures: &failures,
                 params: &self.recipe.report,
-                dirs: &dirs,
+                folders,
                 recipe: Some(recipe),
             };
             report::write(sources, &self.out.join("report"), self.session)?;
@@ -266,13 +267,7 @@ impl Run<'_> {
             .iter()
             .zip(estimates)
             .zip(done.drain(..))
-            .map(|((job, estimate), solved)| {
-                let answer = match &solved {
-                    Some(Ok(rows)) => answer::line(&self.out.join(&job.name), rows).ok().flatten(),
-                    _ => None,
-                };
-                result(job, *estimate, solved, answer, self.recipe.error)
-            })
+            .map(|((job, estimate), solved)| result(job, *estimate, solved, self.recipe.error))
             .collect();
         self.say_what_fell_short(&results);
         Ok((outcome(&results), results))
@@ -316,7 +311,7 @@ impl Run<'_> {
 }
 
 /// The steps of one scan.
-fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Result<Vec<Row>> {
+fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Result<Solved> {
     segment::segment(&job.input, dir, Some(&job.name), &job.segment, session)?;
     if lattice::settings(dir).ok().as_ref() != Some(&recipe.lattice) || session.force {
         lattice::remember(dir, &recipe.lattice)?;
@@ -339,11 +334,11 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
         row.marks.subject.clone_from(&job.subject);
     }
     scan.results().label(&job.group, &job.subject)?;
-    answer::keep(dir, &rows, recipe.error)?;
-    Ok(rows)
+    let answer = answer::keep(dir, &rows, recipe.error)?;
+    Ok(Solved { rows, answer })
 }
 
-fn failures(jobs: &[ScanJob], done: &[Option<Result<Vec<Row>>>]) -> Vec<Failure> {
+fn failures(jobs: &[ScanJob], done: &[Option<Result<Solved>>]) -> Vec<Failure> {
     let failed = jobs.iter().zip(done).filter_map(|(job, solved)| {
         let error = solved.as_ref()?.as_ref().err()?;
         Some(Failure {

@@ -92,34 +92,40 @@ pub(super) fn said_of_kept(rows: &[Row], before: &[Row]) -> &'static str {
     }
 }
 
+/// What the steps of a scan found.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Solved {
+    pub rows: Vec<Row>,
+    pub answer: Option<AnswerLine>,
+}
+
 /// `target` is the relative error asked for, if any.
 pub(super) fn result(
     job: &ScanJob,
     estimate: Estimate,
-    solved: Option<Result<Vec<Row>>>,
-    answer: Option<AnswerLine>,
+    solved: Option<Result<Solved>>,
     target: Option<f64>,
 ) -> ScanResult {
     let missed = |rows: &[Row]| {
         let broken = rows.iter().all(Row::is_disconnected);
         target.is_some_and(|target| !broken && !adaptive::meets(rows, target))
     };
-    let (state, error, rows) = match solved {
-        Some(Ok(rows)) if missed(&rows) => (State::ErrorNotMet, None, rows.len()),
-        Some(Ok(rows)) if rows.iter().any(|row| row.converged() == Some(false)) => {
-            (State::NotConverged, None, rows.len())
+    let (state, error, found) = match solved {
+        Some(Ok(found)) if missed(&found.rows) => (State::ErrorNotMet, None, found),
+        Some(Ok(found)) if found.rows.iter().any(|row| row.converged() == Some(false)) => {
+            (State::NotConverged, None, found)
         }
-        Some(Ok(rows)) => (State::Done, None, rows.len()),
-        Some(Err(e)) => (State::Failed, Some(e.to_string()), 0),
-        None => (State::Planned, None, 0),
+        Some(Ok(found)) => (State::Done, None, found),
+        Some(Err(e)) => (State::Failed, Some(e.to_string()), Solved::default()),
+        None => (State::Planned, None, Solved::default()),
     };
     ScanResult {
         scan: job.name.clone(),
         input: job.input.clone(),
         state,
         error,
-        rows,
-        answer,
+        rows: found.rows.len(),
+        answer: found.answer,
         estimate,
     }
 }

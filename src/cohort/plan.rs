@@ -49,11 +49,11 @@ pub(super) fn plan(
             Ok(e) => {
                 let (to, from) = (to.display(), job.input.display());
                 session.result(format!("{to} <- {from}: {e}"));
-                result(job, estimate, None, None, None)
+                result(job, estimate, None, None)
             }
             Err(e) => {
                 session.warn(format!("{} would fail: {e}", job.name));
-                result(job, estimate, Some(Err(e.clone())), None, None)
+                result(job, estimate, Some(Err(e.clone())), None)
             }
         });
         if let Some(free) = host::available_mib().filter(|free| *free < estimate.memory_mib) {

@@ -11,15 +11,16 @@ use crate::result::condition::{Condition, shared};
 use crate::result::row::Row;
 use std::path::Path;
 
-/// What segmentation and the solves so far in `dir` left.
-pub fn facts(dir: &Path) -> ScanFacts {
+/// What segmentation, as its record says, and the solves so far in `dir` left.
+pub fn facts(dir: &Path, record: &SegmentRecord) -> ScanFacts {
     ScanFacts {
         targets: answer::targets(dir),
-        ..specimen::record(dir).map_or_else(ScanFacts::default, |record| of_record(&record))
+        ..facts_of(record)
     }
 }
 
-fn of_record(record: &SegmentRecord) -> ScanFacts {
+/// What segmentation left.
+fn facts_of(record: &SegmentRecord) -> ScanFacts {
     let results = &record.results;
     ScanFacts {
         size_mm: Some([0, 1, 2].map(|a| results.voxels[a] as f64 * results.spacing_mm[a])),
@@ -28,50 +29,38 @@ fn of_record(record: &SegmentRecord) -> ScanFacts {
     }
 }
 
-/// Writes `answer.json` after one command solved `rows` in `dir`: of all rows there under their condition. None, and nothing is
-/// written, where no row has a modulus, force or moment. `target` is the relative error asked for; without one, that of an earlier command
-/// under the same condition holds.
+/// Writes `answer.json` after one command solved `rows` in `dir`: of all rows there under their condition. The line of that answer;
+/// None, and nothing is written, where no row has a modulus, force or moment. `target` is the relative error asked for; without
+/// one, that of an earlier command under the same condition holds.
 ///
 /// # Errors
 /// A file that cannot be read or written.
-pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answer>> {
+pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<AnswerLine>> {
     let Some(condition) = condition(rows) else {
         return Ok(None);
     };
-    let mut facts = facts(dir);
+    let of_record = |record: SegmentRecord| facts(dir, &record);
+    let mut facts = specimen::record(dir).map_or_else(ScanFacts::default, of_record);
     if let Some(target) = target {
         for row in rows {
             facts.targets.set(&Condition::of(&row.key), target);
         }
     }
     let known = known(dir, rows, &condition)?;
-    let answer = answer::answer(&known, &facts);
-    if let Some(answer) = &answer {
-        answer::write(dir, answer)?;
+    if let Some(answer) = answer::answer(&known, &facts) {
+        answer::write(dir, &answer)?;
     }
-    Ok(answer)
+    Ok(answers(&known, &condition, |_| facts.clone()).pop())
 }
 
 /// The answer of a scan in memory, which `rows` are all of; `target` is the relative error asked for. None where no row has a modulus,
 /// force or moment.
 pub fn of_rows(rows: &[Row], record: &SegmentRecord, target: Option<f64>) -> Option<Answer> {
-    let mut facts = of_record(record);
+    let mut facts = facts_of(record);
     if let (Some(target), Some(condition)) = (target, condition(rows)) {
         facts.targets.set(&condition, target);
     }
     answer::answer(rows, &facts)
-}
-
-/// The answer of the scan in `dir` under the condition of `rows`, which one command solved there.
-///
-/// # Errors
-/// A table that cannot be read.
-pub fn line(dir: &Path, rows: &[Row]) -> Result<Option<AnswerLine>> {
-    let Some(condition) = condition(rows) else {
-        return Ok(None);
-    };
-    let known = known(dir, rows, &condition)?;
-    Ok(answers(&known, &condition, |_| facts(dir)).pop())
 }
 
 /// The condition that the answer is of: of several one with a modulus, then the last.

@@ -61,7 +61,8 @@ pub struct ScanInfo {
 }
 
 /// Reads a scan and says what is known of it.
-/// | # Errors
+///
+/// # Errors
 /// A file that cannot be read, or that is no scan.
 pub fn info(file: &Path) -> Result<ScanInfo> {
     info_of(file, None)

@@ -103,11 +103,12 @@ pub fn scene(path: &Path, out: &Path, session: &Session) -> Result<(Outcome, Opt
 /// Tells scenes apart that go different ways: by the program's version, the scene as it is written, and the values of its files.
 fn fingerprint(scene: &Scene, inputs: &Inputs) -> String {
     let mut hasher = blake3::Hasher::new();
-    let scene = serde_json::to_vec(scene).expect("a scene is plain data");
+    // TOML writes infinite limits of regions too.
+    let scene = toml::to_string(scene).expect("a scene is plain data");
     let bitmap = inputs.bitmap.as_ref();
     let parts: [&[u8]; 6] = [
         env!("CARGO_PKG_VERSION").as_bytes(),
-        &scene,
+        scene.as_bytes(),
         bitmap.map_or(&[], |b| bytemuck::bytes_of(&b.n)),
         bitmap.map_or(&[], |b| bytemuck::cast_slice(&b.inside)),
         bytemuck::cast_slice(inputs.grey.as_deref().unwrap_or_default()),

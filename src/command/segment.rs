@@ -9,7 +9,6 @@ use crate::image::scan::{self, Reading, Scan};
 use crate::io::atomic;
 use crate::machine::session::Session;
 use crate::mask::unmeasured::{self, Hidden};
-use crate::measure::spheres::Spread;
 use crate::pipeline::segment as stage;
 use crate::pipeline::segment::{SegmentParams, SegmentSummary, Voi};
 use crate::record::results;
@@ -374,19 +373,11 @@ fn say(record: &SegmentRecord, session: &Session) {
         ));
     }
     if let Some(m) = &r.morphometry {
-        let mm = |s: &Option<Spread>| {
-            s.as_ref().map_or("NA".into(), |s| {
-                format!("{:.3} ± {:.3} mm", s.mean_mm, s.sd_mm)
-            })
-        };
-        session.result(format!(
-            "{}: Tb.Th {}, Tb.Sp {}, Conn.D {:.2} /mm³, DA {}",
-            record.scan,
-            mm(&m.tb_th),
-            mm(&m.tb_sp),
-            m.conn_d_per_mm3,
-            m.fabric.map_or("NA".into(), |f| format!("{:.3}", f.da)),
-        ));
+        let words = m.listed().map(|(name, value, unit)| match unit {
+            "" => format!("{name} {value}"),
+            unit => format!("{name} {value} {unit}"),
+        });
+        session.result(format!("{}: {}", record.scan, words.join(", ")));
     }
     r.notes
         .iter()

@@ -10,10 +10,11 @@ use crate::operator::held::Held;
 use crate::physics::plasticity::{Plasticity, VonMises, YieldLaw};
 use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::ends::motion::EndMotion;
+use crate::pipeline::apparent::ends::supports;
 use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
-use crate::pipeline::apparent::voxel_fe::supports;
+use crate::pipeline::apparent::voxel_fe::nodes::Gripped;
 use crate::pipeline::apparent::{Ends, Load, Method, SolveParams};
 use crate::result::settings::Motion;
 use crate::volume::Specimen;
@@ -166,8 +167,9 @@ fn fill(
     materials: &Materials,
 ) -> std::io::Result<()> {
     let axis = params.axis.index();
-    let held = supports::held(mesh, grips, motion, params.load);
-    let u = supports::start(mesh, grips, motion);
+    let nodes = Gripped { mesh, grips };
+    let held = supports::held(&nodes, motion, params.load);
+    let u = supports::start(&nodes, motion);
     writeln!(
         out,
         "** {} elements; mm, N, MPa; {}",

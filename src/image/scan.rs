@@ -237,6 +237,7 @@ fn by_format(path: &Path, raw: Option<Contents>) -> Result<Stored> {
             format!("cannot be read: {e}"),
             "check the path and its permissions",
         )
+        .caused_by(e)
     })?;
     if meta.is_dir() {
         return slices::read(path);
@@ -426,6 +427,7 @@ fn hash_file(path: &Path) -> Result<blake3::Hash> {
                 format!("cannot be read: {e}"),
                 "check the path and its permissions",
             )
+            .caused_by(e)
         })
 }
 

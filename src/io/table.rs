@@ -54,10 +54,10 @@ pub fn write<T: Serialize + Default>(path: &Path, records: &[T]) -> Result<()> {
 
 /// Reads records back. Unknown columns are ignored, missing ones take their default.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>> {
-    let mut reader = csv::Reader::from_path(path).map_err(|e| unreadable(path, &e, None))?;
+    let mut reader = csv::Reader::from_path(path).map_err(|e| unreadable(path, e, None))?;
     let header = reader
         .headers()
-        .map_err(|e| unreadable(path, &e, None))?
+        .map_err(|e| unreadable(path, e, None))?
         .clone();
     reader
         .records()
@@ -69,10 +69,10 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>> {
             cells.deserialize(Some(&header))
         })
         .collect::<Result<_, _>>()
-        .map_err(|e| unreadable(path, &e, Some(&header)))
+        .map_err(|e| unreadable(path, e, Some(&header)))
 }
 
-fn unreadable(path: &Path, e: &csv::Error, header: Option<&csv::StringRecord>) -> Error {
+fn unreadable(path: &Path, e: csv::Error, header: Option<&csv::StringRecord>) -> Error {
     let column = match e.kind() {
         csv::ErrorKind::Deserialize { err, .. } => err.field(),
         _ => None,
@@ -84,4 +84,5 @@ fn unreadable(path: &Path, e: &csv::Error, header: Option<&csv::StringRecord>) -
         format!("expected a table of results, could not read it{place}: {e}"),
         "run `solve` again for this scan, or leave the folder out",
     )
+    .caused_by(e)
 }

@@ -19,6 +19,24 @@ pub struct Morphometry {
     pub fabric: Option<Fabric>,
 }
 
+impl Morphometry {
+    /// Name, value and unit of each number, as people read them. NA is missing.
+    pub fn listed(&self) -> [(&'static str, String, &'static str); 4] {
+        let or_na = |words: Option<String>| words.unwrap_or_else(|| "NA".to_owned());
+        let spread = |s: &Option<Spread>| {
+            let words = |s: &Spread| format!("{:.3} ± {:.3}", s.mean_mm, s.sd_mm);
+            or_na(s.as_ref().map(words))
+        };
+        let da = self.fabric.map(|f| format!("{:.3}", f.da));
+        [
+            ("Tb.Th", spread(&self.tb_th), "mm"),
+            ("Tb.Sp", spread(&self.tb_sp), "mm"),
+            ("Conn.D", format!("{:.3}", self.conn_d_per_mm3), "1/mm³"),
+            ("DA", or_na(da), ""),
+        ]
+    }
+}
+
 /// Measures `bone` in its volume of interest of `tv_mm3`: its box, or what is `within` (non-zero). Spacing may differ along
 /// the axes.
 pub fn morphometry(bone: &Volume<u8>, within: Option<&Volume<u8>>, tv_mm3: f64) -> Morphometry {

@@ -78,6 +78,11 @@ pub fn keep_other_version(dir: &Path, session: &Session) {
     }
 }
 
+/// BLAKE3 of the mask that the results in `dir` are of.
+pub fn mask_blake3(dir: &Path) -> Option<String> {
+    Record::read(dir).map(|record| record.provenance.mask_blake3)
+}
+
 /// Settings and details of the solves in `dir`; empty where there are none.
 pub fn details(dir: &Path) -> Vec<(Settings, Details)> {
     let rows = Record::read(dir).map_or(Vec::new(), |record| record.rows);

@@ -10,10 +10,11 @@ use bonepd_ct::discretisation::voxels::Planes;
 use bonepd_ct::operator::held::Constrained;
 use bonepd_ct::pipeline::apparent::discretisation::Prepared;
 use bonepd_ct::pipeline::apparent::ends::motion::EndMotion;
+use bonepd_ct::pipeline::apparent::ends::supports;
 use bonepd_ct::pipeline::apparent::solve_voxels;
 use bonepd_ct::pipeline::apparent::tissue::Tissue;
 use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
-use bonepd_ct::pipeline::apparent::voxel_fe::supports;
+use bonepd_ct::pipeline::apparent::voxel_fe::nodes::Gripped;
 use bonepd_ct::pipeline::apparent::{Ends, SolveParams};
 use bonepd_ct::pipeline::phantom::PhantomParams;
 use bonepd_ct::solver::cg;
@@ -101,8 +102,10 @@ fn plain(specimen: &Specimen, params: &SolveParams) -> (usize, f64) {
     let grid = model.mesh().grid;
     let grips = Planes::within(&grid, params.axis, 0.0).expect("room between the ends");
     let motion = EndMotion::of(specimen, params, grid.size_mm()[params.axis.index()]);
-    let held = supports::held(model.mesh(), grips, &motion, params.load);
-    let mut u = supports::start(model.mesh(), grips, &motion);
+    let mesh = model.mesh();
+    let nodes = Gripped { mesh, grips };
+    let held = supports::held(&nodes, &motion, params.load);
+    let mut u = supports::start(&nodes, &motion);
     let diagonal = Jacobi::new(&Constrained {
         inner: &model,
         held: &held,

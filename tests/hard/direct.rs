@@ -7,9 +7,10 @@ use bonepd_ct::par::dot;
 use bonepd_ct::pipeline::apparent::SolveParams;
 use bonepd_ct::pipeline::apparent::discretisation::Prepared;
 use bonepd_ct::pipeline::apparent::ends::motion::EndMotion;
+use bonepd_ct::pipeline::apparent::ends::supports;
 use bonepd_ct::pipeline::apparent::tissue::Tissue;
 use bonepd_ct::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
-use bonepd_ct::pipeline::apparent::voxel_fe::supports;
+use bonepd_ct::pipeline::apparent::voxel_fe::nodes::{Gripped, grid_places};
 use bonepd_ct::solver::direct::DirectLlt;
 use bonepd_ct::volume::Specimen;
 
@@ -23,8 +24,9 @@ pub fn e_app_mpa(specimen: &Specimen, params: &SolveParams) -> (f64, Probed) {
     let grips = Planes::within(&mesh.grid, params.axis, 0.0).unwrap();
     let length = specimen.length_mm(params.axis);
     let motion = EndMotion::of(specimen, params, length);
-    let held = supports::held(mesh, grips, &motion, params.load);
-    let mut u = supports::start(mesh, grips, &motion);
+    let nodes = Gripped { mesh, grips };
+    let held = supports::held(&nodes, &motion, params.load);
+    let mut u = supports::start(&nodes, &motion);
     for (node, u) in u.iter_mut().enumerate() {
         (0..3)
             .filter(|&c| !held.is_held(node, c))
@@ -32,7 +34,7 @@ pub fn e_app_mpa(specimen: &Specimen, params: &SolveParams) -> (f64, Probed) {
     }
     let mut force = vec![[0.0; 3]; mesh.len()];
     model.apply(&u, &mut force);
-    let probed = probe(&model, &held, &supports::grid_places(mesh), 1);
+    let probed = probe(&model, &held, &grid_places(mesh), 1);
     let mut x: Vec<f64> = probed.unknowns.iter().map(|&(n, c)| -force[n][c]).collect();
     let order: Vec<usize> = (0..x.len()).collect();
     let mut llt = DirectLlt::new(&probed.matrix, &order).unwrap();

@@ -502,6 +502,28 @@ fn a_cohort_says_where_its_scans_differ() {
     }
 }
 
+/// One sentence, however many values there are.
+#[test]
+fn thresholds_of_otsu_are_listed_with_their_scans() {
+    let mut known = known();
+    known.segmented = ["a", "b", "c", "d"].map(segmented).to_vec();
+    for (scan, at) in known.segmented.iter_mut().zip([107.254, 99.0, 99.0]) {
+        scan.threshold = Threshold::Otsu { at: Some(at) };
+    }
+    known.segmented[1].unit = None;
+    let text = section(&[row()], &known);
+    for words in [
+        "Bone was found by Otsu's threshold (Otsu 1979): 107.3 HU (a), 99 in the units of the image (b) and 99 HU (c). Voxels",
+        "5600 HU were bone (of d).",
+    ] {
+        assert!(text.contains(words), "{words}\n{text}");
+    }
+    // Of one value it needs no list.
+    known.segmented.truncate(1);
+    let text = section(&[row()], &known);
+    assert!(text.contains("(Otsu 1979), 107.3 HU."), "{text}");
+}
+
 #[test]
 fn the_criterion_of_a_failure_load_is_the_one_in_use() {
     let mut failing = row();

@@ -75,7 +75,7 @@ mod tests {
         assert_eq!(strangers::<SegmentSettings, SegmentParams>(), none);
         assert_eq!(strangers::<LatticeSettings, LatticeParams>(), none);
         assert_eq!(strangers::<SolveSettings, SolveParams>(), none);
-        // Options of another step are told apart.
+        // Options of another step are strangers.
         let lattice = strangers::<LatticeSettings, SolveParams>();
         assert_eq!(
             lattice,

@@ -1,7 +1,7 @@
 //! Owns what a scan's page says of its input and its segmentation.
 
 use crate::grid::Axis;
-use crate::measure::spheres::Spread;
+use crate::measure::morphometry::Morphometry;
 use crate::record::specimen::SegmentRecord;
 
 /// Key and value, in the order of the page.
@@ -48,23 +48,16 @@ pub(super) fn facts(record: &SegmentRecord) -> Vec<(String, String)> {
     if let Some(t) = results.mean_thickness_mm {
         facts.push(("mean strut thickness (mm)", format!("{t:.3}")));
     }
-    if let Some(m) = &results.morphometry {
-        let spread = |s: &Option<Spread>| {
-            s.as_ref().map_or("NA".into(), |s| {
-                format!("{:.3} ± {:.3}", s.mean_mm, s.sd_mm)
-            })
-        };
-        facts.push(("Tb.Th (mm)", spread(&m.tb_th)));
-        facts.push(("Tb.Sp (mm)", spread(&m.tb_sp)));
-        facts.push(("Conn.D (1/mm³)", format!("{:.3}", m.conn_d_per_mm3)));
-        let da = m.fabric.map_or("NA".into(), |f| format!("{:.3}", f.da));
-        facts.push(("DA", da));
-    }
-    facts.extend(results.warnings.iter().map(|w| ("warning", w.clone())));
+    let own = |(key, value): (&str, String)| (key.to_owned(), value);
+    let mut facts: Vec<(String, String)> = facts.into_iter().map(own).collect();
+    let measured = results.morphometry.iter().flat_map(Morphometry::listed);
+    facts.extend(measured.map(|(name, value, unit)| match unit {
+        "" => (name.to_owned(), value),
+        unit => (format!("{name} ({unit})"), value),
+    }));
+    let warnings = results.warnings.iter().cloned();
+    facts.extend(warnings.map(|warning| ("warning".to_owned(), warning)));
     facts
-        .into_iter()
-        .map(|(key, value)| (key.to_owned(), value))
-        .collect()
 }
 
 fn threshold(record: &SegmentRecord) -> String {

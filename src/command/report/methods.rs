@@ -1,6 +1,6 @@
 //! Owns what the folders of scans say of how they were segmented and solved, for the methods section.
 
-use super::folder;
+use super::{Folder, Folders};
 use crate::command::answer;
 use crate::grid::Axis;
 use crate::pipeline::segment::Align;
@@ -8,10 +8,9 @@ use crate::record::results;
 use crate::record::specimen::SegmentRecord;
 use crate::report::Report;
 use crate::report::methods::{Criterion, Known, Segmented, Threshold, condition};
-use std::path::PathBuf;
 
-/// What is known of the scans of `report` in `dirs`; `failed` further scans have no results.
-pub(super) fn known(report: &Report, dirs: &[PathBuf], failed: usize) -> Known {
+/// What is known of the scans of `report`; `failed` further scans have no results.
+pub(super) fn known(report: &Report, folders: &Folders, failed: usize) -> Known {
     let mut known = Known {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         failed,
@@ -20,17 +19,17 @@ pub(super) fn known(report: &Report, dirs: &[PathBuf], failed: usize) -> Known {
     let condition = condition(report);
     let mut targets: Vec<Option<f64>> = Vec::new();
     for line in &report.answers.lines {
-        let Some((dir, record)) = folder(&line.scan, dirs) else {
+        let Some(Folder { dir, record }) = folders.get(&line.scan) else {
             continue;
         };
-        known.segmented.push(segmented(&record));
+        known.segmented.push(segmented(record));
         let target = condition
             .as_ref()
-            .and_then(|condition| answer::facts(&dir).targets.of(condition));
+            .and_then(|condition| answer::facts(dir, record).targets.of(condition));
         if !targets.contains(&target) {
             targets.push(target);
         }
-        for (pistoia, labels) in results::criteria(&dir) {
+        for (pistoia, labels) in results::criteria(dir) {
             let criterion = Criterion { pistoia, labels };
             if !known.criteria.contains(&criterion) {
                 known.criteria.push(criterion);

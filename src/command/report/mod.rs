@@ -2,13 +2,13 @@
 
 mod details;
 mod facts;
+mod folders;
 mod methods;
 mod stiffness;
 
 use crate::command::stiffness::RECORD;
 use crate::command::{answer, fields};
 use crate::error::Result;
-use crate::image::scan;
 use crate::io::own_files::{ANSWERS, RECIPE, RESULTS};
 use crate::io::{atomic, table};
 use crate::machine::host;
@@ -17,8 +17,8 @@ use crate::recipe::Recipe;
 use crate::record::collect_rows::CollectedRows;
 use crate::record::details::{FAILURE, REACTIONS, SECTIONS, TISSUE, YIELDED, curve as curve_of};
 use crate::record::failures::Failure;
+use crate::record::results::mask_blake3;
 use crate::record::specimen;
-use crate::record::specimen::SegmentRecord;
 use crate::record::stiffness::StiffnessLine;
 use crate::report::answers;
 use crate::report::answers::Answers;
@@ -31,6 +31,7 @@ use crate::result::answer::ScanFacts;
 use crate::result::ffb::with_ffb;
 use crate::result::row::Row;
 use crate::result::strength::CurvePoint;
+pub use folders::{Folder, Folders};
 use std::path::{Path, PathBuf};
 
 /// Reads `results.csv` of each folder (a solved scan, or the output of a run) and writes the report into `out`. Scans that
@@ -51,30 +52,32 @@ pub fn report(dirs: &[PathBuf], out: &Path, session: &Session) -> Result<Vec<Pat
         .map_or_else(ReportParams::default, |recipe| recipe.report);
     // Means of older programs do not say whether they are converged.
     let rows = with_ffb(&rows, &rows);
-    let answers = answers(&rows, dirs);
+    let folders = &Folders::of(&rows, dirs);
+    let answers = answers(&rows, folders);
     let sources = Sources {
         rows: &rows,
         answers,
         failures: &failures,
         params: &params,
-        dirs,
+        folders,
         recipe,
     };
     write(sources, out, session)
 }
 
-/// The answers of `rows`, with what the folders of the scans, under `dirs`, say of them.
+/// The answers of `rows`, with what the folders of their scans say of them.
 #[doc(hidden)]
-pub fn answers(rows: &[Row], dirs: &[PathBuf]) -> Answers {
+pub fn answers(rows: &[Row], folders: &Folders) -> Answers {
     answers::answers(rows, |scan| {
-        folder(scan, dirs).map_or_else(ScanFacts::default, |(dir, _)| answer::facts(&dir))
+        let facts = |folder: &Folder| answer::facts(&folder.dir, &folder.record);
+        folders.get(scan).map_or_else(ScanFacts::default, facts)
     })
 }
 
 /// The methods section of a paper, filled in.
 pub const METHODS: &str = "methods.md";
 
-/// What a report is of. `dirs` are searched for what is known of the scans.
+/// What a report is of.
 #[doc(hidden)]
 pub struct Sources<'a> {
     /// All rows, in their order.
@@ -85,8 +88,8 @@ pub struct Sources<'a> {
     pub failures: &'a [Failure],
     /// Settings of `report`.
     pub params: &'a ReportParams,
-    /// Output folders, or folders of scans.
-    pub dirs: &'a [PathBuf],
+    /// The folders of the scans of `rows`.
+    pub folders: &'a Folders,
     /// The recipe as text; None where rows come from single commands.
     pub recipe: Option<String>,
 }
@@ -99,22 +102,22 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
         answers,
         failures,
         params,
-        dirs,
+        folders,
         recipe,
     } = sources;
-    let mut report = assemble(rows, answers, &strength(rows, dirs), params);
-    report.notes.extend(same_masks(rows, dirs));
-    report.notes.extend(unlike_thresholds(rows, dirs));
+    let mut report = assemble(rows, answers, &strength(folders), params);
+    report.notes.extend(same_masks(folders));
+    report.notes.extend(unlike_thresholds(folders));
     let failed = failures.iter().map(|f| {
         let reason = f.reason.lines().next().unwrap_or_default();
         format!("{}: failed, no results: {reason}", f.scan)
     });
     report.notes.splice(0..0, failed);
-    let pages = pages(rows, dirs);
-    let methods = written(&report, &methods::known(&report, dirs, failures.len()));
+    let pages: Vec<ScanPage> = folders.scans().map(page).collect();
+    let methods = written(&report, &methods::known(&report, folders, failures.len()));
     let mut files = render(&report, &pages, session)?;
     files.push((METHODS.to_owned(), methods.markdown().into_bytes()));
-    files.extend(stiffness_table(rows, &pages, dirs));
+    files.extend(stiffness_table(rows, folders));
     let source = Source {
         recipe,
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -177,49 +180,17 @@ fn render(
     Ok(files)
 }
 
-/// The stress–strain curves of the scans of `rows`.
-fn strength(rows: &[Row], dirs: &[PathBuf]) -> Vec<(String, Vec<CurvePoint>)> {
-    let scans = pages(rows, &[]).into_iter().map(|page| page.scan);
-    let curve = |scan: String| {
-        let (dir, _) = folder(&scan, dirs)?;
-        Some((scan, curve_of(&dir)?))
-    };
-    scans.filter_map(curve).collect()
-}
-
-/// A page for each scan of `rows`.
-fn pages(rows: &[Row], dirs: &[PathBuf]) -> Vec<ScanPage> {
-    let mut pages: Vec<ScanPage> = Vec::new();
-    for row in rows {
-        if pages.iter().all(|page| page.scan != row.key.scan) {
-            pages.push(page(&row.key.scan, dirs));
-        }
-    }
-    pages
-}
-
-/// The folder of a scan, and what was segmented there.
-fn folder(scan: &str, dirs: &[PathBuf]) -> Option<(PathBuf, SegmentRecord)> {
-    let places = dirs.iter().flat_map(|dir| [dir.join(scan), dir.clone()]);
-    places
-        .filter_map(|dir| specimen::record(&dir).map(|record| (dir, record)))
-        .find(|(_, record)| record.scan == scan)
+/// The stress–strain curves of the scans.
+fn strength(folders: &Folders) -> Vec<(String, Vec<CurvePoint>)> {
+    let curve =
+        |(scan, folder): (&str, Option<&Folder>)| Some((scan.to_owned(), curve_of(&folder?.dir)?));
+    folders.scans().filter_map(curve).collect()
 }
 
 /// Scans whose masks are one, voxel by voxel: the same specimen, counted twice.
-fn same_masks(rows: &[Row], dirs: &[PathBuf]) -> Vec<String> {
-    let mut seen: Vec<(String, Vec<String>)> = Vec::new();
-    for page in pages(rows, &[]) {
-        let mask = folder(&page.scan, dirs).map(|(dir, _)| dir.join(specimen::MASK));
-        let Some(hash) = mask.and_then(|mask| scan::hash(&mask).ok()) else {
-            continue;
-        };
-        match seen.iter_mut().find(|(known, _)| *known == hash) {
-            Some((_, scans)) => scans.push(page.scan),
-            None => seen.push((hash, vec![page.scan])),
-        }
-    }
-    let twice = seen.into_iter().filter(|(_, scans)| scans.len() > 1);
+fn same_masks(folders: &Folders) -> Vec<String> {
+    let masks = folders.by(|folder| mask_blake3(&folder.dir));
+    let twice = masks.into_iter().filter(|(_, scans)| scans.len() > 1);
     twice
         .map(|(_, scans)| {
             format!(
@@ -232,20 +203,11 @@ fn same_masks(rows: &[Row], dirs: &[PathBuf]) -> Vec<String> {
 }
 
 /// Says so where a threshold was given and scans differ in it.
-fn unlike_thresholds(rows: &[Row], dirs: &[PathBuf]) -> Option<String> {
-    let mut found: Vec<(String, Vec<String>)> = Vec::new();
-    for page in pages(rows, &[]) {
-        let Some((_, record)) = folder(&page.scan, dirs).filter(|(_, r)| !r.settings.otsu) else {
-            continue;
-        };
-        let Some(lower) = record.results.lower.map(|lower| lower.to_string()) else {
-            continue;
-        };
-        match found.iter_mut().find(|(known, _)| *known == lower) {
-            Some((_, scans)) => scans.push(page.scan),
-            None => found.push((lower, vec![page.scan])),
-        }
-    }
+fn unlike_thresholds(folders: &Folders) -> Option<String> {
+    let found = folders.by(|Folder { record, .. }| {
+        let lower = record.results.lower.filter(|_| !record.settings.otsu);
+        lower.map(|lower| lower.to_string())
+    });
     let words: Vec<String> = found
         .iter()
         .map(|(lower, scans)| format!("{lower}: {}", scans.join(", ")))
@@ -258,8 +220,8 @@ fn unlike_thresholds(rows: &[Row], dirs: &[PathBuf]) -> Option<String> {
     })
 }
 
-fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
-    let Some((dir, record)) = folder(scan, dirs) else {
+fn page((scan, folder): (&str, Option<&Folder>)) -> ScanPage {
+    let Some(Folder { dir, record }) = folder else {
         return ScanPage {
             scan: scan.to_owned(),
             ..ScanPage::default()
@@ -272,30 +234,25 @@ fn page(scan: &str, dirs: &[PathBuf]) -> ScanPage {
         pictures: slices
             .into_iter()
             .map(|png| (caption.clone(), png))
-            .chain(fields::pictures(&dir))
+            .chain(fields::pictures(dir))
             .collect(),
-        facts: facts::facts(&record),
+        facts: facts::facts(record),
         stiffness: crate::record::stiffness::record(&dir.join(RECORD))
             .map(|record| self::stiffness::shown(&record)),
-        tables: details::tables(&dir),
-        files: files(&dir),
+        tables: details::tables(dir),
+        files: files(dir),
     }
 }
 
 /// `stiffness.csv`, where a scan has a stiffness.
-fn stiffness_table(
-    rows: &[Row],
-    pages: &[ScanPage],
-    dirs: &[PathBuf],
-) -> Option<(String, Vec<u8>)> {
-    let of = |page: &ScanPage| {
-        let (dir, _) = folder(&page.scan, dirs)?;
-        let record = crate::record::stiffness::record(&dir.join(RECORD))?;
-        let marks = &rows.iter().find(|row| row.key.scan == page.scan)?.marks;
+fn stiffness_table(rows: &[Row], folders: &Folders) -> Option<(String, Vec<u8>)> {
+    let of = |(scan, folder): (&str, Option<&Folder>)| {
+        let record = crate::record::stiffness::record(&folder?.dir.join(RECORD))?;
+        let marks = &rows.iter().find(|row| row.key.scan == scan)?.marks;
         let (subject, group) = (marks.subject.clone(), marks.group.clone());
         Some(StiffnessLine::of(&record, subject, group))
     };
-    let lines: Vec<StiffnessLine> = pages.iter().filter_map(of).collect();
+    let lines: Vec<StiffnessLine> = folders.scans().filter_map(of).collect();
     (!lines.is_empty()).then(|| {
         (
             "stiffness.csv".to_owned(),

@@ -217,4 +217,11 @@ fn scenes_and_values_of_their_files_are_told_apart() {
     for other in &others {
         assert_ne!(fingerprint(&scene("0.1"), other), print, "{other:?}");
     }
+    let all = crate::recipe::SCENES.iter().map(|(name, text)| {
+        let scene = Scene::parse(text, Path::new(name)).unwrap();
+        fingerprint(&scene, &inputs)
+    });
+    let all: Vec<String> = all.collect();
+    let distinct = all.iter().collect::<std::collections::BTreeSet<_>>();
+    assert!(all.len() > 20 && distinct.len() == all.len());
 }

@@ -4,6 +4,7 @@
 use crate::error::Result;
 use crate::export::bins::Bins;
 use crate::io::atomic;
+use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::geometry_fe::GeometryModel;
 use crate::pipeline::apparent::{Ends, Load, SolveParams};
 use std::io::Write;
@@ -52,10 +53,10 @@ fn fill(
             model.poisson()
         )?;
     }
-    for (set, is_upper) in [("LOW", false), ("HIGH", true)] {
+    for (set, end) in [("LOW", End::Lower), ("HIGH", End::Upper)] {
         writeln!(out, "*NSET, NSET={set}")?;
         for (node, at) in mesh.nodes_mm.iter().enumerate() {
-            if model.grip_of(*at) == Some(is_upper) {
+            if model.grip_of(*at) == Some(end) {
                 writeln!(out, "{},", node + 1)?;
             }
         }
@@ -79,7 +80,7 @@ fn fill(
 fn pins(model: &GeometryModel, axis: usize) -> Vec<(usize, usize)> {
     let (p, q) = ((axis + 1) % 3, (axis + 2) % 3);
     let nodes = &model.elements().mesh.nodes_mm;
-    let low = || (0..nodes.len()).filter(|n| model.grip_of(nodes[*n]) == Some(false));
+    let low = || (0..nodes.len()).filter(|n| model.grip_of(nodes[*n]) == Some(End::Lower));
     let Some(first) = low().next() else {
         return Vec::new();
     };

@@ -134,6 +134,7 @@ pub fn head(path: &Path, limit: u64) -> Result<Vec<u8>> {
             format!("cannot be read: {e}"),
             "the file is damaged: copy it again",
         )
+        .caused_by(e)
     })?;
     Ok(bytes)
 }

@@ -39,6 +39,7 @@ pub fn read_archive(path: &Path) -> Result<Stored> {
             format!("cannot be read: {e}"),
             "check the path and its permissions",
         )
+        .caused_by(e)
     })?;
     let mut archive = ZipArchive::new(BufReader::new(file)).map_err(damaged)?;
     let mut scans = Vec::new();

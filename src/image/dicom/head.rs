@@ -17,6 +17,7 @@ pub fn data(path: &Path) -> Result<Data> {
             format!("cannot be read: {e}"),
             "check the path and its permissions",
         )
+        .caused_by(e)
     })?;
     Data::new(bytes).map_err(|fault| unsound(path, &fault))
 }

@@ -153,6 +153,7 @@ fn fill(source: &mut dyn Read, bytes: &mut [u8], path: &Path) -> Result<()> {
             format!("its NIfTI header of 348 bytes or more is incomplete: {wanted} bytes were expected ({e})"),
             DAMAGED,
         )
+        .caused_by(e)
     })
 }
 

@@ -64,6 +64,7 @@ fn decode(path: &Path) -> Result<DynamicImage> {
             format!("cannot be read: {e}"),
             "check the path and its permissions",
         )
+        .caused_by(e)
     })?;
     let file_bytes = std::fs::metadata(path).map_or(0, |m| m.len());
     let mut limits = image::Limits::default();
@@ -76,6 +77,7 @@ fn decode(path: &Path) -> Result<DynamicImage> {
             format!("cannot be decoded ({e})"),
             "the file is damaged: export it again",
         )
+        .caused_by(e)
     })
 }
 

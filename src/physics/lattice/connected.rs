@@ -4,7 +4,7 @@
 //! of a whole site in shell `s`. Where all shares are 1 this is the uniform lattice, and by Cauchy and Schwarz it is never
 //! negative where the uniform one is not (`k_s + N_s T >= 0`), whatever the shares.
 
-use super::{Moduli, Virial};
+use super::{Direction, Moduli, Virial, part_in_gauge};
 use crate::discretisation::lattice::connected::ConnectedSites;
 use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::operator::{MixedPrecision, Operator};
@@ -15,24 +15,13 @@ use std::ops::Range;
 /// Sites a task takes at once.
 const PORTION: usize = 512;
 
-/// What is the same for all bonds of one direction of the stencil.
-#[derive(Debug, Clone, Copy)]
-struct Direction {
-    d: [f64; 3],
-    shell: usize,
-    /// `k / (2 |d|²)`: a whole bond pulls by `spring · d (d · Δu)`.
-    spring: f64,
-    /// `d` and `spring · d`, for products in single precision.
-    single: [[f32; 3]; 2],
-    /// `1 / (2 |d|)`: a bond stretches by `half · d · Δu`.
-    half: f64,
-}
-
 /// The linearised lattice of connected components as an operator: `K u` is the gradient of the energy. N and mm.
 pub struct ConnectedLattice {
     pub sites: ConnectedSites,
     moduli: Moduli,
     directions: Vec<Direction>,
+    /// `d` and `spring · d` of each direction, for products in single precision.
+    single: Vec<[[f32; 3]; 2]>,
     /// `T N_s / Σ σ` of each site and shell; empty at ν = ¼, where no volumetric pass is made.
     volumetric: Vec<[f64; 2]>,
 }
@@ -40,20 +29,11 @@ pub struct ConnectedLattice {
 impl ConnectedLattice {
     pub fn new(sites: ConnectedSites, moduli: Moduli) -> Self {
         let stencil = sites.frame.structure.stencil();
-        let direction = |b: usize| {
-            let d = stencil.direction(b).map(f64::from);
-            let squared: f64 = d.iter().map(|c| c * c).sum();
-            let shell = usize::from(b / 2 >= stencil.first_shell_pairs);
-            let spring = 0.5 * moduli.k[shell] / squared;
-            Direction {
-                d,
-                shell,
-                spring,
-                single: [1.0, spring].map(|by| d.map(|c| (by * c) as f32)),
-                half: 0.5 / squared.sqrt(),
-            }
-        };
-        let directions: Vec<Direction> = (0..stencil.coordination()).map(direction).collect();
+        let directions = 0..stencil.coordination();
+        let directions: Vec<Direction> = directions
+            .map(|b| Direction::of(&stencil, b, &moduli))
+            .collect();
+        let single = |d: &Direction| [1.0, d.spring].map(|by| d.d.map(|c| (by * c) as f32));
         let mut whole = [0.0; 2];
         directions.iter().for_each(|d| whole[d.shell] += 1.0);
         let coefficients = |site: usize| {
@@ -73,6 +53,7 @@ impl ConnectedLattice {
         let count = if moduli.t == 0.0 { 0 } else { sites.len() };
         ConnectedLattice {
             volumetric: (0..count).into_par_iter().map(coefficients).collect(),
+            single: directions.iter().map(single).collect(),
             sites,
             moduli,
             directions,
@@ -172,13 +153,10 @@ impl ConnectedLattice {
             self.pressures(u, site)
         };
         let part = |(_, d, share, dl): (usize, &Direction, f64, f64)| {
-            let other = plane + d.d[axis] as i32;
-            let inside = plane.max(other).min(grips.high) - plane.min(other).max(grips.low);
-            if inside <= 0 {
+            let Some(inside) = part_in_gauge(grips, plane, d.d[axis]) else {
                 return 0.0;
-            }
+            };
             let lever = d.half * d.d[axis] * d.d[axis] * self.sites.frame.step_mm;
-            let inside = f64::from(inside) / d.d[axis].abs();
             inside * lever * share * (self.moduli.k[d.shell] * dl + pressures[d.shell])
         };
         self.stretched(u, site).map(part).sum()
@@ -339,7 +317,7 @@ impl Coarsen for ConnectedSprings<'_> {
         for (site, y) in sites.zip(y) {
             let mut f = [0f32; 3];
             for (end, b, share) in self.0.sites.bonds.of(site) {
-                let [d, pull] = &self.0.directions[b].single;
+                let [d, pull] = &self.0.single[b];
                 let along: f32 = (0..3).map(|c| d[c] * (x[site][c] - x[end][c])).sum();
                 (0..3).for_each(|c| f[c] += share * along * pull[c]);
             }

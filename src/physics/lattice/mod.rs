@@ -14,7 +14,8 @@ mod kernel;
 pub mod multigrid;
 mod scaled;
 
-use crate::discretisation::lattice::sites::Sites;
+use crate::discretisation::lattice::sites::{Grips, Sites};
+use crate::discretisation::lattice::stencil::Stencil;
 use crate::operator::{MixedPrecision, Operator};
 use crate::par::{each_chunk, sum_chunks};
 pub use moduli::{Moduli, check_solid};
@@ -23,15 +24,38 @@ use scaled::Scaled;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard};
 
-/// One opposite pair of bonds: its direction in grid steps and the moduli scaled for it.
+/// Bonds of one direction or, where bonds are taken pair by pair, of it and its opposite.
 #[derive(Debug, Clone, Copy)]
-struct Pair {
+struct Direction {
+    /// In grid steps.
     d: [f64; 3],
     shell: usize,
     /// `k / (2 |d|²)`: a bond pulls by `spring · d (d · Δu)`.
     spring: f64,
-    /// `1 / (2 |d|)`: a bond adds `half · d · Δu` to its site's volumetric sum.
+    /// `1 / (2 |d|)`: a bond stretches by `half · d · Δu`, which it adds to its site's volumetric sum.
     half: f64,
+}
+
+impl Direction {
+    /// Bond `b` of a stencil.
+    fn of(stencil: &Stencil, b: usize, moduli: &Moduli) -> Self {
+        let d = stencil.direction(b).map(f64::from);
+        let squared: f64 = d.iter().map(|c| c * c).sum();
+        let shell = usize::from(b / 2 >= stencil.first_shell_pairs);
+        Direction {
+            d,
+            shell,
+            spring: 0.5 * moduli.k[shell] / squared,
+            half: 0.5 / squared.sqrt(),
+        }
+    }
+}
+
+/// The part of a bond between the innermost gripped planes, from a site's plane to that `steps` on; None where there is none.
+fn part_in_gauge(grips: Grips, plane: i32, steps: f64) -> Option<f64> {
+    let other = plane + steps as i32;
+    let inside = plane.max(other).min(grips.high) - plane.min(other).max(grips.low);
+    (inside > 0).then(|| f64::from(inside) / steps.abs())
 }
 
 /// Sites a task takes at once: a few hundred kilobytes of what it reads.
@@ -58,7 +82,8 @@ pub trait Virial: Sync {
 pub struct Lattice {
     pub sites: Sites,
     moduli: Moduli,
-    pairs: Vec<Pair>,
+    /// One of each pair of opposite directions.
+    pairs: Vec<Direction>,
     double: Scaled<f64>,
     single: Scaled<f32>,
     scratch: Mutex<Vec<[f64; 2]>>,
@@ -77,18 +102,10 @@ impl Lattice {
 
     fn of(sites: Sites, moduli: Moduli, own_volumetric: Option<Vec<f64>>) -> Self {
         let stencil = sites.frame.structure.stencil();
-        let pair = |(p, d): (usize, &[i32; 3])| {
-            let d = d.map(f64::from);
-            let squared: f64 = d.iter().map(|c| c * c).sum();
-            let shell = usize::from(p >= stencil.first_shell_pairs);
-            Pair {
-                d,
-                shell,
-                spring: 0.5 * moduli.k[shell] / squared,
-                half: 0.5 / squared.sqrt(),
-            }
-        };
-        let pairs: Vec<Pair> = stencil.pairs.iter().enumerate().map(pair).collect();
+        let pairs = 0..stencil.pairs.len();
+        let pairs: Vec<Direction> = pairs
+            .map(|p| Direction::of(&stencil, 2 * p, &moduli))
+            .collect();
         let weighted = sites.weights.is_some();
         let double = Scaled {
             pairs: pairs.iter().map(|p| p.scaled(weighted)).collect(),
@@ -121,7 +138,7 @@ impl Lattice {
     }
 
     /// Every pair with both neighbours along it, from a row of them; a missing one is the site itself.
-    fn bonded(&self, row: &[u32]) -> impl Iterator<Item = (&Pair, usize, usize)> {
+    fn bonded(&self, row: &[u32]) -> impl Iterator<Item = (&Direction, usize, usize)> {
         let ends = row.as_chunks().0.iter();
         let pairs = self.pairs.iter().zip(ends);
         pairs.map(|(pair, &[plus, minus])| (pair, plus as usize, minus as usize))
@@ -193,13 +210,10 @@ impl Lattice {
                 if end == site {
                     continue;
                 }
-                let other = plane + (sign * pair.d[axis]) as i32;
-                let inside = plane.max(other).min(grips.high) - plane.min(other).max(grips.low);
-                if inside <= 0 {
+                let Some(share) = part_in_gauge(grips, plane, sign * pair.d[axis]) else {
                     continue;
-                }
+                };
                 let dl = sign * pair.half * along(pair.d, u[end], u[site]);
-                let share = f64::from(inside) / pair.d[axis].abs();
                 let lever = pair.half * pair.d[axis] * pair.d[axis] * self.sites.frame.step_mm;
                 sum += share * lever * (w * self.moduli.k[pair.shell] * dl + t * theta[pair.shell]);
             }
@@ -208,7 +222,7 @@ impl Lattice {
     }
 }
 
-impl Pair {
+impl Direction {
     /// The pair as the kernels want it; where sites are weighted with the half of `½ (w_i + w_j)`.
     fn scaled(&self, weighted: bool) -> kernel::Pair<f64> {
         let d = self.d;

@@ -22,7 +22,7 @@ pub struct Springs<'a> {
 
 impl<'a> Springs<'a> {
     pub fn new(lattice: &'a Lattice) -> Self {
-        let stiffness = |p: &super::Pair| p.d.map(|a| p.d.map(|b| p.spring * a * b));
+        let stiffness = |p: &super::Direction| p.d.map(|a| p.d.map(|b| p.spring * a * b));
         let stiffness: Vec<_> = lattice.pairs.iter().map(stiffness).collect();
         let negative = |k: &[[f64; 3]; 3]| k.map(|row| row.map(|v| -v as f32));
         Springs {

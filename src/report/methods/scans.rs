@@ -121,10 +121,40 @@ fn unit(s: &Segmented) -> String {
 /// How bone was found, scan by scan, or a sentence for each kind of threshold and unit.
 fn thresholds(all: &[Segmented]) -> String {
     let own = |s: &Segmented| threshold(&[s], &unit(s));
-    if distinct(all.iter().map(own)).len() <= MOST_THRESHOLDS {
-        return by_scan(all, |s| &s.scan, |s| Some(own(s)));
+    if distinct(all.iter().map(own)).len() > MOST_THRESHOLDS {
+        return thresholds_by_kind(all) + " The value of each scan stands in its `segment.json`.";
     }
-    thresholds_by_kind(all) + " The value of each scan stands in its `segment.json`."
+    let otsu = otsu_by_scan(all);
+    let is_said =
+        |s: &Segmented| otsu.is_some() && matches!(s.threshold, Threshold::Otsu { at: Some(_) });
+    let others = by_scan(all, |s| &s.scan, |s| (!is_said(s)).then(|| own(s)));
+    otsu.unwrap_or_default() + &others
+}
+
+/// Otsu's thresholds, each with its scans, in one sentence; None where all are one.
+fn otsu_by_scan(all: &[Segmented]) -> Option<String> {
+    let value = |s: &Segmented| match s.threshold {
+        Threshold::Otsu { at: Some(at) } => Some(format!("{} {}", settings([four(at)]), unit(s))),
+        _ => None,
+    };
+    let values = distinct(all.iter().filter_map(value));
+    let pair = |wanted: &String| {
+        let own = all.iter().filter(|s| value(s).as_ref() == Some(wanted));
+        let names: Vec<&str> = own.map(|s| s.scan.as_str()).collect();
+        format!("{wanted} ({})", scans(&names))
+    };
+    let pairs: Vec<String> = values.iter().map(pair).collect();
+    (pairs.len() > 1).then(|| {
+        format!(
+            " Bone was found by Otsu's threshold (Otsu 1979): {}.",
+            list(&pairs)
+        )
+    })
+}
+
+/// Otsu's threshold without digits that follow from the histogram: four are plenty.
+fn four(v: f64) -> f64 {
+    format!("{v:.3e}").parse().unwrap_or(v)
 }
 
 fn thresholds_by_kind(all: &[Segmented]) -> String {
@@ -159,8 +189,7 @@ fn threshold(of: &[&Segmented], unit: &str) -> String {
         let bound = |s: &&Segmented| match &s.threshold {
             Threshold::Window { upper: Some(v), .. } if upper => Some(*v),
             Threshold::Window { lower: Some(v), .. } if !upper => Some(*v),
-            // Its digits follow from the histogram; four are plenty.
-            Threshold::Otsu { at } => at.map(|v| format!("{v:.3e}").parse().unwrap_or(v)),
+            Threshold::Otsu { at } => at.map(four),
             _ => None,
         };
         settings(of.iter().filter_map(bound))

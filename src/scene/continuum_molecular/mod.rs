@@ -292,7 +292,10 @@ impl Checked<'_> {
         let (scene, model, setup) = (self.scene, self.model, &self.setup);
         match self.solution {
             Solution::One(bodies) => solve(scene, model, setup, *bodies, observer),
-            Solution::Sweep(sweep) => sweep::run(scene, model, sweep, setup, self.inputs, observer),
+            Solution::Sweep(sweep) => sweep::run(model, sweep, setup, observer, |one, observer| {
+                let bodies = check::bodies(scene, one, setup, self.inputs)?;
+                solve(scene, one, setup, bodies, observer)
+            }),
         }
     }
 }

@@ -3,11 +3,10 @@
 mod saved_state;
 
 use super::setup::Setup;
-use super::{KnownField, Molecular, check};
+use super::{KnownField, Molecular};
 use crate::discretisation::plane::Points;
 use crate::error::{Error, Result};
 use crate::scene::frame::{Frame, Observer, Summary};
-use crate::scene::setting::{Inputs, Setting};
 use serde::{Deserialize, Serialize};
 
 /// Which parameter, over which values.
@@ -89,13 +88,13 @@ impl Observer for Quiet<'_> {
     }
 }
 
+/// Runs the scene for each value; `solve` does so for one.
 pub fn run(
-    scene: &Setting,
     model: &Molecular,
     sweep: &Sweep,
     setup: &Setup,
-    inputs: &Inputs,
     observer: &mut dyn Observer,
+    solve: impl Fn(&Molecular, &mut dyn Observer) -> Result<Summary>,
 ) -> Result<Summary> {
     let mut warned = Vec::new();
     observer.start(&setup.points, sweep.values.len())?;
@@ -121,9 +120,7 @@ pub fn run(
             last: Frame::default(),
             warned: &mut warned,
         };
-        let one = sweep.apply(model, value);
-        let bodies = check::bodies(scene, &one, setup, inputs)?;
-        let one = super::solve(scene, &one, setup, bodies, &mut quiet)?;
+        let one = solve(&sweep.apply(model, value), &mut quiet)?;
         let fields = std::mem::take(&mut quiet.last.fields);
         observer.frame(&Frame {
             time: value,

@@ -112,9 +112,10 @@ fn label(labels: &mut [u16], m: [usize; 3]) -> usize {
     let strides = [1, m[0], m[0] * m[1]];
     let mut up = parts::apart(labels.len());
     for v in (0..labels.len()).filter(|&v| labels[v] != NO_PIECE) {
-        for a in 0..3 {
-            if !(v / strides[a]).is_multiple_of(m[a]) && labels[v - strides[a]] != NO_PIECE {
-                parts::join(&mut up, v as u32, (v - strides[a]) as u32);
+        for (stride, m) in strides.into_iter().zip(m) {
+            let at = v / stride % m;
+            if at > 0 && labels[v - stride] != NO_PIECE {
+                parts::join(&mut up, v as u32, (v - stride) as u32);
             }
         }
     }

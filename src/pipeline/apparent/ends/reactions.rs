@@ -13,6 +13,15 @@ pub enum End {
 }
 
 impl End {
+    /// The end that a place belongs to: up to `low` or from `high` on.
+    pub fn at<T: PartialOrd>(place: T, low: T, high: T) -> Option<End> {
+        match place {
+            _ if place <= low => Some(End::Lower),
+            _ if place >= high => Some(End::Upper),
+            _ => None,
+        }
+    }
+
     /// The word of `reactions.csv`.
     pub fn name(self) -> &'static str {
         match self {

@@ -1,6 +1,6 @@
 //! Owns the mesh of a specimen: its making, what is said of it against the mask, and the tissue of its elements.
 
-use super::supports::Grips;
+use super::nodes::Grips;
 use super::{size, surface};
 use crate::discretisation::tetrahedra::fill::fill;
 use crate::discretisation::tetrahedra::lattice::Lattice;

@@ -2,10 +2,10 @@
 
 mod cost;
 mod mesh;
+mod nodes;
 mod record;
 mod sensitivity;
 mod size;
-mod supports;
 mod surface;
 
 use crate::discretisation::tetrahedra::surface::Surface;
@@ -19,6 +19,8 @@ use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, Displacements, EndSites, Known, LoadSet, Prepared, System,
 };
 use crate::pipeline::apparent::ends::motion::EndMotion;
+use crate::pipeline::apparent::ends::reactions::End;
+use crate::pipeline::apparent::ends::supports;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::solved::Moduli;
@@ -30,8 +32,8 @@ use crate::solver::amg::AmgParams;
 use crate::solver::cg::NoGoal;
 use crate::volume::Specimen;
 use mesh::Report;
+use nodes::Grips;
 use record::Recorder;
-use supports::Grips;
 
 /// Smooth elements between grips, or joined to the faces where unit strains are the load.
 pub struct GeometryModel {
@@ -65,10 +67,9 @@ impl GeometryModel {
 
     /// What the motion of the ends holds, and the displacements that it starts from, in mm.
     pub fn end_motion(&self) -> (Held, Displacements) {
-        let mesh = &self.model.mesh;
         (
-            supports::held(mesh, &self.grips, &self.motion, self.params.load),
-            supports::start(mesh, &self.grips, &self.motion),
+            supports::held(self, &self.motion, self.params.load),
+            supports::start(self, &self.motion),
         )
     }
 
@@ -80,18 +81,16 @@ impl GeometryModel {
         ]
     }
 
-    /// The grip that holds a place: the upper one if true.
-    pub fn grip_of(&self, at_mm: [f64; 3]) -> Option<bool> {
-        let upper = self.grips.is_upper(at_mm);
-        self.grips.is_gripped(at_mm).then_some(upper)
+    /// The end whose grip holds a place.
+    pub fn grip_of(&self, at_mm: [f64; 3]) -> Option<End> {
+        self.grips.end(at_mm)
     }
 
     fn ends(&self) -> EndSites<'_> {
-        let (mesh, grips) = (&self.model.mesh, &self.grips);
         EndSites {
             motion: self.motion,
-            planes_mm: [grips.low_mm, grips.high_mm],
-            each: Box::new(move |visit| supports::each_end_node(mesh, grips, visit)),
+            planes_mm: [self.grips.low_mm, self.grips.high_mm],
+            each: Box::new(move |visit| supports::each_end_node(self, visit)),
         }
     }
 }
@@ -181,12 +180,12 @@ impl Discretisation for GeometryModel {
             held: match loads {
                 LoadSet::Ends => self.end_motion().0,
                 LoadSet::UnitStrains(numbers) => {
-                    supports::held_faces(mesh, self.params.conditions, numbers[0])
+                    supports::held_faces(self, self.params.conditions, numbers[0])
                 }
             },
             start: Box::new(move |load| match loads {
-                LoadSet::Ends => supports::start(mesh, &self.grips, &self.motion),
-                LoadSet::UnitStrains(_) => supports::affine(mesh, load),
+                LoadSet::Ends => supports::start(self, &self.motion),
+                LoadSet::UnitStrains(_) => supports::affine(self, mesh.size_mm, load),
             }),
             ends: self.ends(),
             load_steps: None,
@@ -201,7 +200,7 @@ impl Discretisation for GeometryModel {
         let (grips, loaded, info) = (&self.grips, &self.motion.loaded, solved.info);
         // Σ x_i f_i is the volume integral of the stress: positions are a displacement field of the elements.
         let nodes = || self.model.mesh.nodes_mm.iter().zip(solved.force);
-        let upper = nodes().filter(|(at, _)| grips.is_upper(**at));
+        let upper = nodes().filter(|(at, _)| grips.end(**at) == Some(End::Upper));
         let reaction: f64 = upper.map(|(_, f)| f[grips.axis]).sum();
         let virial: f64 = nodes()
             .map(|(at, f)| grips.along(*at) * f[grips.axis])

@@ -11,15 +11,15 @@ use crate::discretisation::lattice::sites::Grips;
 use crate::error::{Error, Result};
 use crate::measure::apparent::Loaded;
 use crate::operator::coarsen::Coarsen;
-use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::Virial;
-use crate::pipeline::apparent::discretisation::{Displacements, EndSites, Places, System};
+use crate::pipeline::apparent::discretisation::{EndSites, Places, System};
 use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::ends::reactions::End;
+use crate::pipeline::apparent::ends::supports::{self, Node, Nodes};
 use crate::pipeline::apparent::fields::Equilibrated;
 use crate::pipeline::apparent::lattice::stress::Stress;
-use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::lattice::Case;
 use crate::result::settings::{BoundaryRule, CellType, Method, Motion, Settings};
@@ -58,6 +58,26 @@ struct Placed<'a> {
     dropped: usize,
 }
 
+impl Nodes for Placed<'_> {
+    fn count(&self) -> usize {
+        self.indices.len()
+    }
+
+    fn each(&self, mut visit: impl FnMut(usize, Node)) {
+        let Grips { low, high } = self.grips;
+        for (site, &at) in self.indices.iter().enumerate() {
+            let plane = self.plane(site);
+            let node = Node {
+                place_mm: self.frame.position_mm(at),
+                on_side: std::array::from_fn(|c| self.frame.on_side(at, c)),
+                end: End::at(plane, low, high),
+                along: f64::from(plane.clamp(low, high) - low) / f64::from(high - low),
+            };
+            visit(site, node);
+        }
+    }
+}
+
 impl<'a> Placed<'a> {
     fn plane(&self, site: usize) -> i32 {
         self.indices[site][self.frame.axis.index()]
@@ -79,45 +99,8 @@ impl<'a> Placed<'a> {
         EndSites {
             motion,
             planes_mm: [self.grips.low, self.grips.high].map(height),
-            each: Box::new(move |visit| {
-                for (site, at) in self.indices.iter().enumerate() {
-                    let end = match at[axis] {
-                        plane if plane <= self.grips.low => End::Lower,
-                        plane if plane >= self.grips.high => End::Upper,
-                        _ => continue,
-                    };
-                    visit(site, end, self.frame.position_mm(*at));
-                }
-            }),
+            each: Box::new(move |visit| supports::each_end_node(&self, visit)),
         }
-    }
-
-    /// Unknowns that the grips and, where sides are confined, the sides hold.
-    fn held(&self, params: &SolveParams, motion: &EndMotion) -> Held {
-        let axis = params.axis.index();
-        let mut held = Held::none(self.indices.len());
-        for s in 0..self.indices.len() {
-            let gripped = self.grips.holds(self.plane(s));
-            for c in 0..3 {
-                let on_side = self.frame.on_side(self.indices[s], c);
-                let confined = params.load == Load::Confined && c != axis && on_side;
-                let bonded = gripped && (c == axis || motion.held_sideways);
-                if confined || bonded {
-                    held.hold(s, c);
-                }
-            }
-        }
-        held
-    }
-
-    /// A start that meets these supports: the ends' motion, spread evenly between them.
-    fn start(&self, motion: &EndMotion) -> Displacements {
-        let Grips { low, high } = self.grips;
-        let of = |s: usize| {
-            let along = f64::from(self.plane(s).clamp(low, high) - low) / f64::from(high - low);
-            motion.at(self.frame.position_mm(self.indices[s]), along)
-        };
-        (0..self.indices.len()).map(of).collect()
     }
 
     fn system<O: MixedPrecision, C: Coarsen, M: Virial>(
@@ -135,8 +118,8 @@ impl<'a> Placed<'a> {
             multigrid: AmgParams::lattice(self.frame.lp_mm),
             // The stress along the axis is that of ends that come nearer or part.
             goal: goal.filter(|_| motion.motion == Motion::Along),
-            held: self.held(params, &motion),
-            start: Box::new(move |_| self.start(&motion)),
+            held: supports::held(&self, &motion, params.load),
+            start: Box::new(move |_| supports::start(&self, &motion)),
             ends: self.ends(motion),
             load_steps: None,
             sites: self.indices.len(),

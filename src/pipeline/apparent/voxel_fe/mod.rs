@@ -4,12 +4,12 @@ pub mod bricks;
 pub mod cost;
 pub mod failure;
 mod labels;
+pub mod nodes;
 pub mod plastic;
 mod principal;
 mod record;
 mod sections;
 mod spread;
-pub mod supports;
 mod threshold;
 mod tissue_spread;
 
@@ -24,12 +24,14 @@ use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, EndSites, Known, LoadSet, LoadSteps, Places, Prepared, System,
 };
 use crate::pipeline::apparent::ends::motion::EndMotion;
+use crate::pipeline::apparent::ends::supports;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use crate::pipeline::apparent::voxel_fe::labels::Labels;
+use crate::pipeline::apparent::voxel_fe::nodes::{Gripped, along, grid_places};
 use crate::pipeline::apparent::voxel_fe::record::Recorder;
 use crate::result::settings::{CellType, Method, Settings};
 use crate::solver::amg::AmgParams;
@@ -79,13 +81,20 @@ impl VoxelModel {
         }
     }
 
+    fn gripped(&self) -> Gripped<'_> {
+        Gripped {
+            mesh: self.bricks.mesh(),
+            grips: self.grips,
+        }
+    }
+
     fn ends(&self) -> EndSites<'_> {
-        let (mesh, grips) = (self.bricks.mesh(), self.grips);
-        let h = mesh.grid.spacing_mm[grips.axis.index()];
+        let (nodes, grips) = (self.gripped(), self.grips);
+        let h = nodes.mesh.grid.spacing_mm[grips.axis.index()];
         EndSites {
             motion: self.motion,
             planes_mm: [grips.low, grips.high].map(|plane| plane as f64 * h),
-            each: Box::new(move |visit| supports::each_end_node(mesh, grips, visit)),
+            each: Box::new(move |visit| supports::each_end_node(&nodes, visit)),
         }
     }
 
@@ -152,21 +161,21 @@ impl Discretisation for VoxelModel {
         &self,
         loads: LoadSet,
     ) -> System<'_, impl MixedPrecision, impl Precondition, impl Functional<3>> {
-        let (mesh, grips, motion) = (self.bricks.mesh(), self.grips, &self.motion);
+        let (mesh, nodes, motion) = (self.bricks.mesh(), self.gripped(), &self.motion);
         System {
             operator: &self.bricks,
             coarsen: &self.bricks,
             multigrid: self.multigrid(),
             goal: None::<NoGoal>,
             held: match loads {
-                LoadSet::Ends => supports::held(mesh, grips, motion, self.params.load),
+                LoadSet::Ends => supports::held(&nodes, motion, self.params.load),
                 LoadSet::UnitStrains(numbers) => {
-                    supports::held_faces(mesh, self.params.conditions, numbers[0])
+                    supports::held_faces(&nodes, self.params.conditions, numbers[0])
                 }
             },
             start: Box::new(move |load| match loads {
-                LoadSet::Ends => supports::start(mesh, grips, motion),
-                LoadSet::UnitStrains(_) => supports::affine(mesh, load),
+                LoadSet::Ends => supports::start(&nodes, motion),
+                LoadSet::UnitStrains(_) => supports::affine(&nodes, mesh.grid.size_mm(), load),
             }),
             ends: self.ends(),
             load_steps: self.params.plasticity.as_ref().map(|_| self.load_steps()),
@@ -174,7 +183,7 @@ impl Discretisation for VoxelModel {
             dropped: mesh.dropped,
             volume_mm3: mesh.elements as f64 * mesh.grid.voxel_mm3(),
             places: self.params.mechanisms.then(|| Places {
-                at: supports::grid_places(mesh),
+                at: grid_places(mesh),
                 reach: 1,
             }),
         }
@@ -201,7 +210,7 @@ impl Discretisation for VoxelModel {
             })
         };
         let reaction = sum(&|plane| if plane >= grips.high { 1.0 } else { 0.0 });
-        let virial = loaded.gauge_mm * sum(&|plane| supports::along(grips, plane));
+        let virial = loaded.gauge_mm * sum(&|plane| along(grips, plane));
         let from_energy_mpa = loaded.from_energy(info.energy);
         Moduli {
             e_app_mpa: from_energy_mpa,

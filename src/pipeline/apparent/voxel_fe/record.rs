@@ -8,6 +8,7 @@ use crate::physics::hex8::element;
 use crate::physics::hex8::fields::{Brick, Deformed, Kind};
 use crate::physics::hex8::flips::Solved;
 use crate::pipeline::apparent::discretisation::Prepared;
+use crate::pipeline::apparent::ends::supports::held;
 use crate::pipeline::apparent::fields::{Equilibrated, Field, FieldVolume, Place, Recorded};
 use crate::pipeline::apparent::params::{Sed, SolveParams};
 use crate::pipeline::apparent::tissue::Tissue;
@@ -17,9 +18,7 @@ use crate::pipeline::apparent::voxel_fe::principal::principal_fields;
 use crate::pipeline::apparent::voxel_fe::sections::{ALL, sections};
 use crate::pipeline::apparent::voxel_fe::spread::{onto, spread};
 use crate::pipeline::apparent::voxel_fe::tissue_spread::{density, effective_strain};
-use crate::pipeline::apparent::voxel_fe::{
-    VoxelModel, failure, supports, threshold, tissue_spread,
-};
+use crate::pipeline::apparent::voxel_fe::{VoxelModel, failure, threshold, tissue_spread};
 use crate::result::details::{Details, FailureAt};
 use crate::volume::{Specimen, Volume};
 
@@ -202,7 +201,7 @@ impl<'a> Recorder<'a> {
         let solved = Solved {
             mesh,
             stiffness: &element::stiffness(h, young_mpa, poisson, rule),
-            held: &supports::held(mesh, grips, &self.model.motion, self.params.load),
+            held: &held(&self.model.gripped(), &self.model.motion, self.params.load),
             u: self.solved.u,
         };
         let mean = mean_mpa * h.iter().product::<f64>();

@@ -9,6 +9,7 @@ use crate::mask::gaussian;
 use crate::physics::hex8::flips::Solved;
 use crate::volume::{Specimen, Volume};
 use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// Part of the bone volume that changes sides.
 const MOVED: f64 = 0.01;
@@ -96,11 +97,18 @@ impl Shell {
     fn keep_nearest(&mut self, values: &[f32]) {
         let moved = ((MOVED * self.elements as f64) as usize).max(1);
         let rising = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]).then(a.cmp(b));
-        self.bone.sort_unstable_by(rising);
-        self.pores.sort_unstable_by(|a, b| rising(b, a));
-        self.bone.truncate(moved);
-        self.pores.truncate(moved);
+        keep_first(&mut self.bone, moved, rising);
+        keep_first(&mut self.pores, moved, |a, b| rising(b, a));
     }
+}
+
+/// Leaves the first `n` of the voxels, in their order. No two are equal in it.
+fn keep_first(voxels: &mut Vec<usize>, n: usize, order: impl Fn(&usize, &usize) -> Ordering) {
+    if n < voxels.len() {
+        voxels.select_nth_unstable_by(n, &order);
+        voxels.truncate(n);
+    }
+    voxels.sort_unstable_by(order);
 }
 
 fn at(grid: Grid, e: usize) -> [usize; 3] {
@@ -146,4 +154,24 @@ fn joins(grid: Grid, filled: &[bool], e: usize) -> bool {
         open.extend((0..27).filter(|j| bone[*j] && !seen[*j] && share_a_face(i, *j)));
     }
     (0..27).any(|i| bone[i] && !seen[i])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values that repeat: which of them stay, and in which order, is that of a whole sort.
+    #[test]
+    fn the_first_voxels_are_those_of_a_whole_sort() {
+        let value = |e: usize| (e * 7919 % 31) as f32;
+        let rising = |a: &usize, b: &usize| value(*a).total_cmp(&value(*b)).then(a.cmp(b));
+        for n in [1, 2, 50, 199, 200, 201] {
+            let mut sorted: Vec<usize> = (0..200).rev().collect();
+            let mut kept = sorted.clone();
+            keep_first(&mut kept, n, rising);
+            sorted.sort_unstable_by(rising);
+            sorted.truncate(n);
+            assert_eq!(kept, sorted, "{n}");
+        }
+    }
 }

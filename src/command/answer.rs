@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::io::own_files::RESULTS;
 use crate::io::table;
-use crate::record::answer;
+use crate::record::answer::{self, Answer};
 use crate::record::specimen;
 use crate::record::specimen::SegmentRecord;
 use crate::result::answer::{AnswerLine, ScanFacts, answers};
@@ -15,11 +15,12 @@ use std::path::Path;
 pub fn facts(dir: &Path, record: &SegmentRecord) -> ScanFacts {
     ScanFacts {
         targets: answer::targets(dir),
-        ..of_record(record)
+        ..facts_of(record)
     }
 }
 
-fn of_record(record: &SegmentRecord) -> ScanFacts {
+/// What segmentation left.
+fn facts_of(record: &SegmentRecord) -> ScanFacts {
     let results = &record.results;
     ScanFacts {
         size_mm: Some([0, 1, 2].map(|a| results.voxels[a] as f64 * results.spacing_mm[a])),
@@ -55,7 +56,7 @@ pub fn keep(dir: &Path, rows: &[Row], target: Option<f64>) -> Result<Option<Answ
 /// The answer of a scan in memory, which `rows` are all of; `target` is the relative error asked for. None where no row has a modulus,
 /// force or moment.
 pub fn of_rows(rows: &[Row], record: &SegmentRecord, target: Option<f64>) -> Option<Answer> {
-    let mut facts = of_record(record);
+    let mut facts = facts_of(record);
     if let (Some(target), Some(condition)) = (target, condition(rows)) {
         facts.targets.set(&condition, target);
     }

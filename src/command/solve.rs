@@ -4,13 +4,14 @@ mod kept_steps;
 
 use crate::command::fields::Fields;
 use crate::command::in_words::{in_words, sections_in_words};
-use crate::command::lattice::binned;
+use crate::command::lattice::{binned, picture};
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
 use crate::export::inp;
 use crate::export::tetrahedra::{self, Kind};
 use crate::format::orient::Turn;
 use crate::io::atomic;
+use crate::io::own_files::SITES;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
 use crate::measure::morphometry::Morphometry;
@@ -209,8 +210,12 @@ impl OpenScan {
                 details::write_curve(&self.dir, &curve)?;
                 kept_steps::forget(&self.dir);
             }
-            fields.write(&self.dir)?;
+            fields.write(&self.dir, &self.specimen, params.axis)?;
             rows.push(row);
+        }
+        if of_lattices && !session.dry_run && !self.dir.join(SITES).exists() {
+            let held = (params.axis, params.grip_mm);
+            picture::write(&self.dir, &self.specimen, lattices, held)?;
         }
         let known = self.results.solved();
         let all = with_derived(&rows, &known);

@@ -130,6 +130,7 @@ pub fn lattice(
         lattices.push(summary);
     }
     if !session.dry_run {
+        picture::write(dir, &specimen, params, (Axis::Z, 0.0))?;
         write(dir, params, lattices.clone())?;
     }
     Ok(lattices)

@@ -1,10 +1,10 @@
-//! Owns `segment` on disk: a scan in, `mask.nii.gz`, `segment.json` and `segment.png` out, and reading them back.
+//! Owns `segment` on disk: a scan in, `mask.nii.gz`, `segment.json` and pictures out, and reading them back.
 
-use crate::draw::picture;
+use crate::draw::{map, picture, still, view};
 use crate::error::{Error, Result};
 use crate::format::calibration::GreyUnit;
 use crate::format::orient::Turn;
-use crate::grid::Grid;
+use crate::grid::{Axis, Grid};
 use crate::image::scan::{self, Reading, Scan};
 use crate::io::atomic;
 use crate::machine::session::Session;
@@ -309,7 +309,9 @@ fn is_whole(kept: &SegmentRecord, dir: &Path, params: &SegmentParams) -> bool {
     kept.version == env!("CARGO_PKG_VERSION")
         && kept.settings == *params
         && dir.join(specimen::MASK).is_file()
-        && dir.join(specimen::PICTURE).is_file()
+        && [specimen::PICTURE, specimen::STILL, specimen::VIEW]
+            .iter()
+            .all(|picture| dir.join(picture).is_file())
         && (!params.keeps_grey() || dir.join(specimen::GREY).is_file())
 }
 
@@ -322,8 +324,20 @@ fn write(
     atomic::create_dir(dir)?;
     // An old record must not vouch for a new mask, should the program be stopped between the two.
     let _ = std::fs::remove_file(dir.join(specimen::RECORD));
-    picture::write(&dir.join(specimen::PICTURE), scan, &specimen.bone)?;
+    pictures(dir, scan, specimen)?;
     specimen::write(dir, specimen, record)
+}
+
+/// The specimen's long axis is z whatever it was in the scan.
+fn pictures(dir: &Path, scan: &Volume<f32>, specimen: &Specimen) -> Result<()> {
+    let bone = &specimen.bone;
+    picture::write(&dir.join(specimen::PICTURE), scan, bone)?;
+    map::write_png(&dir.join(specimen::STILL), &still::bone(bone, Axis::Z))?;
+    let view = view::page(&specimen.name, bone, Axis::Z, None);
+    atomic::write(&dir.join(specimen::VIEW), view)?;
+    // Sites of lattices of another mask.
+    let _ = std::fs::remove_file(dir.join(specimen::SITES));
+    Ok(())
 }
 
 fn say(record: &SegmentRecord, session: &Session) {

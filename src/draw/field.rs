@@ -1,59 +1,60 @@
-//! Owns the picture of a field: mid-slices of the three planes in colours, with a colour bar.
+//! Owns the picture of a field: mid-slices of the three planes in colours, with a scale bar and a colour bar.
 
-use crate::draw::map::{self, Range};
-use crate::draw::picture::write_text;
+use crate::draw::colour_bar::{self, Coloured};
+use crate::draw::ink::{self, PAPER};
+use crate::draw::map::Range;
 use crate::volume::Volume;
 use image::{Rgb, RgbImage};
 
 /// Pixels of the longest side of a specimen.
-const SIDE: f64 = 360.0;
-const MARGIN: u32 = 14;
-const CAPTION: u32 = 24;
-/// Width next to the slices, for the colour bar.
-const BAR: u32 = 150;
-const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
+const SIDE: f64 = 400.0;
+const MARGIN: u32 = 20;
+/// Under the slices.
+const CAPTION: u32 = 50;
+/// Next to the slices, for the colour bar.
+const BAR: u32 = 190;
+/// Height of letters, pixels.
+const TEXT: f32 = 18.0;
 /// Where no element is.
 const PORE: Rgb<u8> = Rgb([225, 225, 225]);
-
-/// Colours end here: a few elements at the grips or at thin struts have many times what all others have.
-const SHOWN: f64 = 0.99;
 
 /// Which axes run right and down, and through the paper; z runs up.
 const PLANES: [[usize; 3]; 3] = [[0, 1, 2], [0, 2, 1], [1, 2, 0]];
 
-/// Slices through the middle of a field that is 0 where no element is. None where it is 0 everywhere.
-pub fn draw(values: &Volume<f32>) -> Option<RgbImage> {
-    let range = range(values)?;
-    let size = values.grid.size_mm();
+/// Slices through the middle of a field that is 0 where no element is.
+pub fn draw(field: &Coloured) -> RgbImage {
+    let grid = field.values.grid;
+    let size = grid.size_mm();
     let per_mm = SIDE / size.iter().copied().fold(0.0, f64::max);
     let pixels = |axis: usize| ((size[axis] * per_mm).round() as u32).max(1);
-    let height = PLANES.map(|[_, down, _]| pixels(down)).into_iter().max()?;
+    let height = PLANES
+        .map(|[_, down, _]| pixels(down))
+        .into_iter()
+        .fold(240, u32::max);
     let width: u32 = PLANES
         .map(|[right, ..]| pixels(right) + MARGIN)
         .iter()
         .sum();
-    let mut picture = RgbImage::from_pixel(
-        width + MARGIN + BAR,
-        height.max(160) + CAPTION + 2 * MARGIN,
-        PAPER,
-    );
+    let mut picture = RgbImage::from_pixel(width + MARGIN + BAR, height + CAPTION + MARGIN, PAPER);
+    let foot = (MARGIN + height) as f32 + 26.0;
     let mut left = MARGIN;
     for plane @ [right, down, through] in PLANES {
         let panel = [pixels(right), pixels(down)];
-        slice(&mut picture, left, panel, values, plane, range);
+        slice(&mut picture, left, panel, field.values, plane, field.range);
         let names = ["x", "y", "z"];
+        let middle_mm = (grid.n[through] / 2) as f64 * grid.spacing_mm[through];
         let text = format!(
-            "{}{} {}={}",
-            names[right],
-            names[down],
-            names[through],
-            values.grid.n[through] / 2
+            "{}{}, {} = {middle_mm:.2} mm",
+            names[right], names[down], names[through]
         );
-        write_text(&mut picture, [left, MARGIN + height.max(160) + 8], &text);
+        ink::write(&mut picture, [left as f32, foot], TEXT, &text);
         left += panel[0] + MARGIN;
     }
-    map::bar(&mut picture, [left - 2 * map::MARGIN, height], range);
-    Some(picture)
+    let bar = [left + 8, MARGIN + 56];
+    colour_bar::draw(&mut picture, field, bar, height - 62, TEXT);
+    let scale = [(left - MARGIN) as f32 - SIDE as f32 / 4.0, foot];
+    ink::scale_bar(&mut picture, scale, per_mm, SIDE / 4.0, TEXT);
+    picture
 }
 
 fn slice(
@@ -84,33 +85,6 @@ fn slice(
     }
 }
 
-/// From 0 to what [`SHOWN`] of the elements do not exceed; to both sides of 0 where values are of either sign.
-fn range(values: &Volume<f32>) -> Option<Range> {
-    let step = (values.grid.len() / 400_000).max(1);
-    let sample = values.as_slice().iter().step_by(step);
-    let mut found: Vec<f32> = sample
-        .copied()
-        .filter(|v| *v != 0.0 && v.is_finite())
-        .collect();
-    let signed = found.iter().any(|v| *v < 0.0);
-    found.iter_mut().for_each(|v| *v = v.abs());
-    found.sort_unstable_by(f32::total_cmp);
-    let last = found.len().checked_sub(1)?;
-    let high = rounded_up(f64::from(found[(SHOWN * last as f64) as usize]));
-    Some(Range {
-        low: if signed { -high } else { 0.0 },
-        high,
-    })
-}
-
-/// The next number whose thirds have few digits.
-fn rounded_up(value: f64) -> f64 {
-    let power = 10f64.powf(value.log10().floor());
-    let steps = [1.2, 1.5, 1.8, 2.4, 3.0, 3.6, 4.5, 6.0, 7.5, 9.0, 12.0];
-    let least = steps.into_iter().find(|step| step * power >= value);
-    least.map_or(value, |step| step * power)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -121,10 +95,15 @@ mod tests {
         let grid = Grid::new([2, 2, 2], [1.0; 3]);
         // Only the upper layer holds elements.
         let values: Vec<f32> = (0..8).map(|i| if i < 4 { 0.0 } else { 2.0 }).collect();
-        let picture = draw(&Volume::from_vec(grid, values)).unwrap();
-        let xz = MARGIN + 360 + MARGIN;
-        assert_eq!(*picture.get_pixel(xz + 5, MARGIN + 350), PORE);
-        assert_ne!(*picture.get_pixel(xz + 5, MARGIN + 5), PORE);
-        assert!(draw(&Volume::from_vec(grid, vec![0.0; 8])).is_none());
+        let values = Volume::from_vec(grid, values);
+        let range = colour_bar::range(&values).unwrap();
+        let picture = draw(&Coloured {
+            values: &values,
+            name: "value",
+            range,
+        });
+        let xz = MARGIN + SIDE as u32 + MARGIN;
+        assert_eq!(*picture.get_pixel(xz + 5, MARGIN + 390), PORE);
+        assert_eq!(*picture.get_pixel(xz + 5, MARGIN + 5), range.colour(2.0));
     }
 }

@@ -2,7 +2,7 @@
 //! animated GIF.
 
 use crate::discretisation::plane::Points;
-use crate::draw::picture::write_text;
+use crate::draw::ink::{self, INK, PAPER};
 use crate::error::{Error, Result};
 use crate::io::atomic;
 use image::codecs::gif::{GifEncoder, Repeat};
@@ -12,14 +12,14 @@ use std::path::Path;
 
 /// Pixels of the longer side of a body.
 const SIDE: f64 = 420.0;
-pub(super) const MARGIN: u32 = 14;
+const MARGIN: u32 = 14;
 const BAR: u32 = 16;
 const LABELS: u32 = 110;
-const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
-const INK: Rgb<u8> = Rgb([30, 30, 30]);
+/// Height of letters, pixels.
+const TEXT: f32 = 17.0;
 
 /// Colours at equal distances along a scale.
-type Scale = &'static [[u8; 3]];
+pub(super) type Scale = &'static [[u8; 3]];
 
 /// Dark blue over green to yellow, even in lightness: after matplotlib's viridis (van der Walt and Smith, CC0).
 const SEQUENTIAL: Scale = &[
@@ -76,13 +76,17 @@ impl Range {
         }
     }
 
+    /// Colours at equal distances from the low to the high end.
+    pub(super) fn scale(&self) -> Scale {
+        match self.low == -self.high {
+            true => DIVERGING,
+            false => SEQUENTIAL,
+        }
+    }
+
     pub(super) fn colour(&self, value: f64) -> Rgb<u8> {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
-        let scale = if self.low == -self.high {
-            DIVERGING
-        } else {
-            SEQUENTIAL
-        };
+        let scale = self.scale();
         let at = share * (scale.len() - 1) as f64;
         let k = (at as usize).min(scale.len() - 2);
         let mix = |a: u8, b: u8| (a as f64 + (at - k as f64) * (b as f64 - a as f64)).round() as u8;
@@ -107,15 +111,12 @@ pub fn draw(points: &Points, values: &[f64], range: Range, time: f64) -> RgbImag
         }
     }
     bar(&mut picture, size, range);
-    write_text(
-        &mut picture,
-        [MARGIN, height - MARGIN - 10],
-        &format!("t={}", short(time)),
-    );
+    let foot = [MARGIN as f32, (height - MARGIN + 4) as f32];
+    ink::write(&mut picture, foot, TEXT, &format!("t = {}", short(time)));
     picture
 }
 
-pub(super) fn bar(picture: &mut RgbImage, size: [u32; 2], range: Range) {
+fn bar(picture: &mut RgbImage, size: [u32; 2], range: Range) {
     let (left, length) = (size[0] + 2 * MARGIN, size[1].max(160));
     for y in 0..length {
         let share = 1.0 - y as f64 / (length - 1) as f64;
@@ -127,12 +128,13 @@ pub(super) fn bar(picture: &mut RgbImage, size: [u32; 2], range: Range) {
         let y = MARGIN + ((1.0 - share) * (length - 1) as f64) as u32;
         (0..4).for_each(|x| picture.put_pixel(left + BAR + x, y, INK));
         let text = short(range.low + share * (range.high - range.low));
-        write_text(picture, [left + BAR + 8, y.saturating_sub(7).max(2)], &text);
+        let place = [(left + BAR + 8) as f32, y as f32 + 6.0];
+        ink::write(picture, place, TEXT, &ink::with_minus(&text));
     }
 }
 
 /// At most four significant digits, no trailing zeros.
-fn short(value: f64) -> String {
+pub(super) fn short(value: f64) -> String {
     if value == 0.0 || value.abs() < 1e-12 {
         return "0".into();
     }

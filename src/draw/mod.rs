@@ -1,5 +1,10 @@
-//! Pictures of masks and of plane fields, as PNG and GIF.
+//! Pictures: masks and fields in slices and in three dimensions, plane fields as maps.
 
+pub mod colour_bar;
 pub mod field;
+mod ink;
 pub mod map;
 pub mod picture;
+mod reduced;
+pub mod still;
+pub mod view;

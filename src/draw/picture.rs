@@ -1,7 +1,8 @@
 //! Owns `segment.png`: mid-slices of the three planes, grey values with the mask's outline over them.
 
-use crate::error::{Error, Result};
-use crate::io::atomic;
+use crate::draw::ink::{self, PAPER};
+use crate::draw::map;
+use crate::error::Result;
 use crate::volume::Volume;
 use image::{Rgb, RgbImage};
 use std::path::Path;
@@ -25,25 +26,13 @@ const NEAR: [(i32, i32); 8] = [
     (0, 2),
     (0, -2),
 ];
-const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
-const INK: Rgb<u8> = Rgb([30, 30, 30]);
+/// Height of letters, pixels.
+const TEXT: f32 = 18.0;
 
 /// Three panels: xy (as in the slices), xz and yz (z upwards), each through the middle, with a scale bar.
 /// Both volumes are on the same grid.
 pub fn write(path: &Path, grey: &Volume<f32>, bone: &Volume<u8>) -> Result<()> {
-    let picture = draw(grey, bone);
-    let mut png = std::io::Cursor::new(Vec::new());
-    picture
-        .write_to(&mut png, image::ImageFormat::Png)
-        .map_err(|e| {
-            Error::file(
-                path,
-                format!("cannot be encoded: {e}"),
-                "report this as a bug",
-            )
-            .caused_by(e)
-        })?;
-    atomic::write(path, png.into_inner())
+    map::write_png(path, &draw(grey, bone))
 }
 
 /// A plane through the middle: which axes run right and down, and whether down is reversed.
@@ -86,6 +75,7 @@ fn draw(grey: &Volume<f32>, bone: &Volume<u8>) -> RgbImage {
         RgbImage::from_pixel(total.max(3 * 150), height + CAPTION + 2 * MARGIN, PAPER);
     let range = contrast(grey);
     let mut left = MARGIN;
+    let foot = (MARGIN + height + 24) as f32;
     for (plane, width) in PLANES.iter().zip(widths) {
         let panel = [width, pixels(plane.down)];
         draw_plane(
@@ -99,16 +89,18 @@ fn draw(grey: &Volume<f32>, bone: &Volume<u8>) -> RgbImage {
         );
         let names = ["x", "y", "z"];
         let text = format!(
-            "{}{} {}={}",
+            "{}{}, {} = {}",
             names[plane.right],
             names[plane.down],
             names[plane.through],
             grey.grid.n[plane.through] / 2
         );
-        write_text(&mut picture, [left, MARGIN + height + 10], &text);
+        ink::write(&mut picture, [left as f32, foot], TEXT, &text);
         left += width + MARGIN;
     }
-    scale_bar(&mut picture, per_mm, height);
+    let right = (picture.width() - MARGIN) as f32;
+    let place = [right - (SIDE / 4.0) as f32, foot];
+    ink::scale_bar(&mut picture, place, per_mm, SIDE / 4.0, TEXT);
     picture
 }
 
@@ -164,75 +156,6 @@ fn contrast(grey: &Volume<f32>) -> (f32, f32) {
         (dark, light)
     } else {
         (dark, dark + 1.0)
-    }
-}
-
-/// A bar of 1, 2 or 5 times a power of ten mm, about a quarter of the panels' side.
-fn scale_bar(picture: &mut RgbImage, per_mm: f64, height: u32) {
-    let wanted = SIDE / 4.0 / per_mm;
-    let decade = 10f64.powf(wanted.log10().floor());
-    let mm = [5.0, 2.0, 1.0]
-        .into_iter()
-        .map(|f| f * decade)
-        .find(|l| *l <= wanted)
-        .unwrap_or(decade);
-    let length = (mm * per_mm) as u32;
-    let text = format!("{mm} mm");
-    let text_width = 12 * text.chars().count() as u32;
-    let right = picture.width() - MARGIN;
-    let left = right.saturating_sub(length);
-    let y = MARGIN + height + 15;
-    for x in left..right {
-        for dy in 0..4 {
-            picture.put_pixel(x, y + dy, INK);
-        }
-    }
-    write_text(
-        picture,
-        [left.saturating_sub(text_width + 6), MARGIN + height + 10],
-        &text,
-    );
-}
-
-/// Rows of 5-pixel glyphs, top first, high bit left.
-fn glyph(c: char) -> [u8; 7] {
-    match c {
-        '0' => [14, 17, 19, 21, 25, 17, 14],
-        '1' => [4, 12, 4, 4, 4, 4, 14],
-        '2' => [14, 17, 1, 2, 4, 8, 31],
-        '3' => [31, 2, 4, 2, 1, 17, 14],
-        '4' => [2, 6, 10, 18, 31, 2, 2],
-        '5' => [31, 16, 30, 1, 1, 17, 14],
-        '6' => [6, 8, 16, 30, 17, 17, 14],
-        '7' => [31, 1, 2, 4, 8, 8, 8],
-        '8' => [14, 17, 17, 14, 17, 17, 14],
-        '9' => [14, 17, 17, 15, 1, 2, 12],
-        'x' => [0, 0, 17, 10, 4, 10, 17],
-        'y' => [0, 0, 17, 17, 15, 1, 14],
-        'z' => [0, 0, 31, 2, 4, 8, 31],
-        'm' => [0, 0, 26, 21, 21, 21, 21],
-        '=' => [0, 0, 31, 0, 31, 0, 0],
-        '-' => [0, 0, 0, 31, 0, 0, 0],
-        't' => [8, 8, 28, 8, 8, 9, 6],
-        '.' => [0, 0, 0, 0, 0, 12, 12],
-        _ => [0; 7],
-    }
-}
-
-/// Text at twice the glyphs' size, 12 pixels a character; what does not fit is cut.
-pub(crate) fn write_text(picture: &mut RgbImage, [left, top]: [u32; 2], text: &str) {
-    for (i, c) in text.chars().enumerate() {
-        for (row, bits) in glyph(c).into_iter().enumerate() {
-            for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {
-                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                    let x = left + 12 * i as u32 + 2 * column + dx;
-                    let y = top + 2 * row as u32 + dy;
-                    if x < picture.width() && y < picture.height() {
-                        picture.put_pixel(x, y, INK);
-                    }
-                }
-            }
-        }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::format::orient::{self, Turn};
 use crate::image::{nifti, scan};
 use crate::io::atomic;
-pub use crate::io::own_files::{GREY, MASK, PICTURE, RECORD, VOI};
+pub use crate::io::own_files::{GREY, MASK, PICTURE, RECORD, SITES, STILL, VIEW, VOI};
 use crate::pipeline::segment::{SegmentParams, SegmentSummary, Surface, shown};
 use crate::result::shape::Image;
 use crate::volume::{Specimen, Threshold, Volume};

@@ -258,7 +258,7 @@ fn reference(own: &[&SolvedRow]) -> Option<f64> {
 }
 
 /// A name that is safe in any file system.
-fn file_name(scan: &str) -> String {
+pub(crate) fn file_name(scan: &str) -> String {
     scan.chars()
         .map(|c| {
             if c.is_alphanumeric() || "-_.".contains(c) {

@@ -18,8 +18,10 @@ use serde::Serialize;
 #[derive(Debug, Clone, Default)]
 pub struct ScanPage {
     pub scan: String,
-    /// Pictures as PNG, each with its caption: `segment.png`, fields.
+    /// Pictures as PNG, each with its caption: the bone, slices, sites, fields.
     pub pictures: Vec<(String, Vec<u8>)>,
+    /// Views that turn under the mouse: what each shows, and its file next to the page.
+    pub views: Vec<(String, String)>,
     /// Key and value: what is known of the input, the segmentation, the solve.
     pub facts: Vec<(String, String)>,
     /// Apparent stiffness, where it was asked for: conditions in words, matrix, constants.
@@ -59,6 +61,7 @@ struct Shown<'a> {
 struct Page<'a> {
     scan: &'a str,
     pictures: Vec<Picture<'a>>,
+    views: &'a [(String, String)],
     facts: &'a [(String, String)],
     stiffness: &'a Option<ShownStiffness>,
     tables: &'a [(String, Table)],
@@ -143,6 +146,7 @@ fn shown_page<'a>(page: &'a ScanPage, figures: &[&'a Figure]) -> Page<'a> {
                 base64: STANDARD.encode(png),
             })
             .collect(),
+        views: &page.views,
         facts: &page.facts,
         stiffness: &page.stiffness,
         tables: &page.tables,

@@ -12,6 +12,7 @@ pub mod plot;
 mod answer_figures;
 mod comparison;
 mod curves;
+pub(crate) use curves::file_name;
 pub mod figure;
 mod sample;
 pub mod statistics;

@@ -5,6 +5,7 @@ mod facts;
 mod folders;
 mod methods;
 mod stiffness;
+mod views;
 
 use crate::command::stiffness::RECORD;
 use crate::command::{answer, fields};
@@ -113,11 +114,13 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
         format!("{}: failed, no results: {reason}", f.scan)
     });
     report.notes.splice(0..0, failed);
-    let pages: Vec<ScanPage> = folders.scans().map(page).collect();
+    let mut pages: Vec<ScanPage> = folders.scans().map(page).collect();
+    let views = views::linked(&mut pages, folders);
     let methods = written(&report, &methods::known(&report, folders, failures.len()));
     let mut files = render(&report, &pages, session)?;
     files.push((METHODS.to_owned(), methods.markdown().into_bytes()));
     files.extend(stiffness_table(rows, folders));
+    files.extend(views);
     let source = Source {
         recipe,
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -227,22 +230,37 @@ fn page((scan, folder): (&str, Option<&Folder>)) -> ScanPage {
             ..ScanPage::default()
         };
     };
-    let slices = std::fs::read(dir.join(specimen::PICTURE)).ok();
-    let caption = "Mid-slices of the three planes, with the outline of the mask".to_owned();
+    let picture = |name: &str, caption: &str| {
+        let png = std::fs::read(dir.join(name)).ok()?;
+        Some((caption.to_owned(), png))
+    };
+    let of_mask = [
+        picture(specimen::STILL, STILL),
+        picture(
+            specimen::PICTURE,
+            "Mid-slices of the three planes, with the outline of the mask",
+        ),
+        picture(specimen::SITES, SITES),
+    ];
     ScanPage {
         scan: scan.to_owned(),
-        pictures: slices
+        pictures: of_mask
             .into_iter()
-            .map(|png| (caption.clone(), png))
-            .chain(fields::pictures(dir))
+            .flatten()
+            .chain(fields::pictures::found(dir))
             .collect(),
         facts: facts::facts(record),
         stiffness: crate::record::stiffness::record(&dir.join(RECORD))
             .map(|record| self::stiffness::shown(&record)),
+        views: Vec::new(),
         tables: details::tables(dir),
         files: files(dir),
     }
 }
+
+/// Captions.
+const STILL: &str = "The bone within the box of the scan, smoothed; parallel view, so that the scale bar holds in all of the picture; z is the long axis";
+const SITES: &str = "Sites of the coarsest firm and floppy lattice over the bone; those that bone hides are half seen. Left the whole specimen, right a part of it";
 
 /// `stiffness.csv`, where a scan has a stiffness.
 fn stiffness_table(rows: &[Row], folders: &Folders) -> Option<(String, Vec<u8>)> {

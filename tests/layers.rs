@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The table in the crate's root. `cli` and `main` are the binary: they see the library by its name only.
-const LAYERS: [(&str, u32); 26] = [
+const LAYERS: [(&str, u32); 27] = [
     ("error", 0),
     ("par", 0),
     ("parts", 0),

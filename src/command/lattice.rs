@@ -1,5 +1,7 @@
 //! Owns `lattice` on disk: builds the lattices of a segmented scan, reports their counts, exports them.
 
+pub(super) mod picture;
+
 use crate::command::estimate::refuse_lattice_that_does_not_fit;
 use crate::discretisation::lattice::connected::ConnectedSites;
 use crate::discretisation::lattice::sites::Sites;
@@ -108,6 +110,7 @@ pub fn lattice(
     if let Some(note) = params.note() {
         session.say(note);
     }
+    let (drawn, mut shown) = (picture::coarsest(&params.cases()), Vec::new());
     let mut lattices = Vec::new();
     for case in params.cases() {
         refuse_lattice_that_does_not_fit(&of_lattice(case), prepared, &exports.tissue)?;
@@ -124,13 +127,18 @@ pub fn lattice(
                     written.sites(&case, &mixed)?;
                 }
             }
+            if let Some(at) = drawn.iter().position(|of| *of == case) {
+                shown.push((at, picture::shown(&case, &sites)));
+            }
             summarise(&specimen, &case, &sites)
         };
         session.result(summary.in_words());
         lattices.push(summary);
     }
     if !session.dry_run {
-        picture::write(dir, &specimen, params, (Axis::Z, 0.0))?;
+        shown.sort_by_key(|(at, _)| *at);
+        let shown: Vec<_> = shown.into_iter().map(|(_, lattice)| lattice).collect();
+        picture::write(dir, &specimen, &shown)?;
         write(dir, params, lattices.clone())?;
     }
     Ok(lattices)

@@ -265,10 +265,11 @@ impl OpenScan {
             }
             rows.push(row);
         }
-        let pictured = |dir: &&PathBuf| of_lattices && !session.dry_run && !dir.join(SITES).exists();
+        let pictured =
+            |dir: &&PathBuf| of_lattices && !session.dry_run && !dir.join(SITES).exists();
         if let Some(dir) = self.dir.as_ref().filter(pictured) {
             let held = (params.axis, params.grip_mm);
-            picture::write(dir, &self.specimen, lattices, held)?;
+            picture::build_and_write(dir, &self.specimen, lattices, held)?;
         }
         let known = self.results.solved();
         let all = with_derived(&rows, &known);

@@ -74,10 +74,7 @@ pub fn keep_other_version(dir: &Path, session: &Session) {
             format!("results-{version}.csv"),
         ),
         // Of a record that cannot be read, or of none.
-        None => (
-            "another program".to_owned(),
-            "results-other.csv".to_owned(),
-        ),
+        None => ("another program".to_owned(), "results-other.csv".to_owned()),
     };
     details::remove(dir);
     if std::fs::rename(&table, dir.join(&kept)).is_ok() {

@@ -10,29 +10,36 @@ use crate::pipeline::lattice::{Boundary, Case, LatticeParams, build};
 use crate::volume::Specimen;
 use std::path::Path;
 
-/// Builds them and draws them, where there are such lattices; firm first, as in the paper.
+/// Builds them and draws them. Solves keep no sites, and the coarsest lattices are built in little time.
 ///
 /// # Errors
 /// A lattice that does not fit the specimen, an unwritable folder.
-pub(in crate::command) fn write(
+pub(in crate::command) fn build_and_write(
     dir: &Path,
     specimen: &Specimen,
     params: &LatticeParams,
     (load, grip_mm): (Axis, f64),
 ) -> Result<()> {
-    let shown: Result<Vec<ShownLattice>> = coarsest(&params.cases())
+    let drawn: Result<Vec<ShownLattice>> = coarsest(&params.cases())
         .iter()
         .map(|case| Ok(shown(case, &build(specimen, case, load, grip_mm)?)))
         .collect();
-    let shown = shown?;
-    if shown.iter().all(|lattice| lattice.kinds.is_empty()) {
-        return Ok(());
-    }
-    map::write_png(&dir.join(SITES), &lattices(&specimen.bone, &shown))
+    write(dir, specimen, &drawn?)
 }
 
-/// The firm and the floppy lattice of the first structure that has the largest lattice parameter.
-fn coarsest(cases: &[Case]) -> Vec<Case> {
+/// Draws them, where there are such lattices.
+///
+/// # Errors
+/// An unwritable folder.
+pub(super) fn write(dir: &Path, specimen: &Specimen, drawn: &[ShownLattice]) -> Result<()> {
+    if drawn.iter().all(|lattice| lattice.kinds.is_empty()) {
+        return Ok(());
+    }
+    map::write_png(&dir.join(SITES), &lattices(&specimen.bone, drawn))
+}
+
+/// The firm and the floppy lattice of the first structure that has the largest lattice parameter; firm first, as in the paper.
+pub(super) fn coarsest(cases: &[Case]) -> Vec<Case> {
     let drawn = |case: &&Case| [Boundary::Firm, Boundary::Floppy].contains(&case.boundary);
     let Some(first) = cases.iter().find(drawn) else {
         return Vec::new();
@@ -43,7 +50,8 @@ fn coarsest(cases: &[Case]) -> Vec<Case> {
     found
 }
 
-fn shown(case: &Case, sites: &Sites) -> ShownLattice<'static> {
+/// The sites of a lattice, by kind.
+pub(super) fn shown(case: &Case, sites: &Sites) -> ShownLattice<'static> {
     let (word, kinds) = match case.boundary {
         Boundary::Firm => {
             let kind = |name, colour, is_full| Kind {

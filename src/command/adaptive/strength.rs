@@ -9,7 +9,7 @@ use crate::command::ladder::split_voxels;
 use crate::command::solve::OpenScan;
 use crate::error::Result;
 use crate::machine::session::Session;
-use crate::pipeline::apparent::{SolveParams, of_voxels};
+use crate::pipeline::apparent::{LoadSteps, SolveParams, of_voxels};
 use crate::pipeline::lattice::LatticeParams;
 use crate::record::error_target_note::ErrorTargetNote;
 use crate::result::notes;
@@ -20,8 +20,8 @@ use std::path::Path;
 /// Share of the target that is left to the load steps.
 const STEPS_SHARE: f64 = 0.25;
 
-/// Load steps are not doubled beyond.
-const MOST_STEPS: usize = 160;
+/// Lengths of load steps are halved so many times at most.
+const HALVINGS: u32 = 4;
 
 /// Elements a voxel along each axis, after one.
 const SPLIT: [usize; 2] = [2, 3];
@@ -62,10 +62,13 @@ impl Climb<'_> {
         if self.is_disconnected() {
             return Ok(());
         }
-        self.step(1, 2 * steps)?;
-        while self.steps_leave_open(steps) && 4 * steps <= MOST_STEPS {
-            steps *= 2;
-            self.step(1, 2 * steps)?;
+        self.step(1, steps.halved())?;
+        for _ in 1..HALVINGS {
+            if !self.steps_leave_open(steps) {
+                break;
+            }
+            steps = steps.halved();
+            self.step(1, steps.halved())?;
         }
         for split in SPLIT {
             if let Err(refused) = self.fits(split) {
@@ -81,7 +84,7 @@ impl Climb<'_> {
         Ok(())
     }
 
-    fn params(&self, split: usize, steps: usize) -> SolveParams {
+    fn params(&self, split: usize, steps: LoadSteps) -> SolveParams {
         SolveParams {
             steps,
             ..split_voxels(self.params, split)
@@ -89,7 +92,7 @@ impl Climb<'_> {
     }
 
     /// Solves, and states the errors that the rows so far say together.
-    fn step(&mut self, split: usize, steps: usize) -> Result<()> {
+    fn step(&mut self, split: usize, steps: LoadSteps) -> Result<()> {
         let params = self.params(split, steps);
         let rows = self
             .scan
@@ -114,7 +117,7 @@ impl Climb<'_> {
         self.scan.results().edit_rows(put)
     }
 
-    fn steps_leave_open(&self, steps: usize) -> bool {
+    fn steps_leave_open(&self, steps: LoadSteps) -> bool {
         of_steps(&self.rows, steps).is_some_and(|open| open > STEPS_SHARE * self.target)
     }
 

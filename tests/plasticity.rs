@@ -1,5 +1,6 @@
 //! Tissue that yields: the laws at a point, bodies against closed forms and themselves, CalculiX, the command.
 
+mod adaptive;
 mod bodies;
 mod calculix;
 mod closed_forms;

@@ -13,7 +13,9 @@ use bonepd_ct::machine::session::Session;
 use bonepd_ct::physics::plasticity::Plasticity;
 use bonepd_ct::pipeline::apparent::checks::needs_modulus;
 use bonepd_ct::pipeline::apparent::fields::Field;
-use bonepd_ct::pipeline::apparent::{CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams};
+use bonepd_ct::pipeline::apparent::{
+    CoarsenBy, Conditions, Ends, Load, LoadSteps, Method, Sed, SolveParams,
+};
 use bonepd_ct::result::answer::AnswerLine;
 use bonepd_ct::result::row::Row;
 use clap::Args;
@@ -145,9 +147,10 @@ pub struct SolveSettings {
     /// labels:100=von-mises:68,127=asymmetric:50,75. Writes DIR/curve.csv
     #[arg(long, value_name = "LAW", value_parser = law::plasticity)]
     plasticity: Option<Plasticity>,
-    /// Number of even load steps with --plasticity; a step that fails is halved [default: 10]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), requires = "plasticity")]
-    steps: Option<u16>,
+    /// Load steps with --plasticity: so many even ones, or adaptive ones, whose lengths follow the curve (adaptive/2: half as
+    /// long); a step that fails is halved [default: adaptive]
+    #[arg(long, value_name = "N", value_parser = LoadSteps::parse, requires = "plasticity")]
+    steps: Option<LoadSteps>,
     /// Only the bone of these labels counts in that criterion, comma-separated
     #[arg(
         long,

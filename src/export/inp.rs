@@ -15,7 +15,7 @@ use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
 use crate::pipeline::apparent::voxel_fe::nodes::Gripped;
-use crate::pipeline::apparent::{Ends, Load, Method, SolveParams};
+use crate::pipeline::apparent::{Ends, Load, LoadSteps, Method, SolveParams};
 use crate::result::settings::Motion;
 use crate::volume::Specimen;
 use std::io::Write;
@@ -209,7 +209,11 @@ fn fill(
     match yields(params) {
         None => writeln!(out, "*STEP\n*STATIC")?,
         Some(_) => {
-            let step = 1.0 / params.steps as f64;
+            // Increments of adaptive lengths are CalculiX's own, up to a tenth.
+            let step = match params.steps {
+                LoadSteps::Adaptive(_) => 0.1 * params.steps.length(),
+                LoadSteps::Even(_) => params.steps.length(),
+            };
             writeln!(out, "*STEP, INC=10000\n*STATIC\n{step}, 1.0, 1e-5, {step}")?;
             // Residuals of a thousandth of a percent, as of the solves here.
             writeln!(out, "*CONTROLS, PARAMETERS=FIELD\n1e-5, 1e-3")?;

@@ -126,5 +126,5 @@ pub(super) const TOLERANCE: Column = column("tolerance", "", "relative algebraic
 pub(super) const STEPS: Column = column(
     "steps",
     "",
-    "even load steps of plasticity; failed ones are halved",
+    "load steps of plasticity: a number of even ones, or adaptive (lengths follow the curve; adaptive/N divides them by N); failed ones are halved",
 );

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::grid::Axis;
 use crate::io::{atomic, table};
 use crate::result::details::{Details, EndForces, FailureAt, SectionShare, TissueSpread};
+use crate::result::load_steps::LoadSteps;
 use crate::result::settings::{BoundaryRule, CellType, Load, Method, Sed, Settings, Supports};
 use crate::result::strength::{CurvePoint, YieldedShare};
 use serde::Serialize;
@@ -45,7 +46,7 @@ struct Of {
     tolerance: Option<f64>,
     sed: Option<Sed>,
     /// Of tissue that yields.
-    steps: Option<u64>,
+    steps: Option<LoadSteps>,
 }
 
 impl Of {

@@ -4,6 +4,7 @@ use crate::discretisation::lattice::placement::Boundary;
 use crate::discretisation::lattice::stencil::Structure;
 use crate::grid::Axis;
 pub use crate::result::load::{Conditions, Ends, Load, Motion, Sed};
+use crate::result::load_steps::LoadSteps;
 use serde::{Deserialize, Serialize};
 
 /// Column `method`: how a specimen is discretised.
@@ -269,7 +270,7 @@ pub struct Settings {
     /// The law by which tissue yields; None where it is elastic.
     pub plasticity: Option<String>,
     /// Load steps of such tissue.
-    pub steps: Option<u64>,
+    pub steps: Option<LoadSteps>,
 }
 
 impl Settings {

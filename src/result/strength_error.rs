@@ -4,6 +4,7 @@
 //! several voxels thick, 0.4 where voxels meet in edges (`reports/strength.md`). The power is fitted to three sizes; of two it is taken for
 //! 1/2. With the power `p` a difference between two sizes leaves `sizeᵖ / (largerᵖ − smallerᵖ)` times as much at `size`.
 
+use crate::result::load_steps::LoadSteps;
 use crate::result::row::Row;
 use crate::result::strength::Strength;
 
@@ -20,8 +21,7 @@ const ORDERS: [f64; 2] = [0.3, 1.0];
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Solve {
     element_mm: f64,
-    /// Length of a load step over the load.
-    step: f64,
+    steps: LoadSteps,
     stresses_mpa: [Option<f64>; 2],
     /// Relative error of the solver.
     solver: f64,
@@ -38,7 +38,7 @@ impl Solve {
         } = solved.strength;
         (row.converged() == Some(true)).then_some(Solve {
             element_mm: row.key.lp_mm,
-            step: 1.0 / row.key.steps? as f64,
+            steps: row.key.steps?,
             stresses_mpa: [yield_stress_mpa, max_stress_mpa],
             solver: 0.01 * solved.algebraic_error_percent?,
         })
@@ -49,12 +49,12 @@ impl Solve {
 /// converged.
 pub fn stated(row: &Row, rows: &[Row]) -> Option<Strength> {
     let own = Solve::of(row)?;
-    let known: Vec<Solve> = rows.iter().filter_map(Solve::of).collect();
+    let known = alike(rows, own.steps);
     let error = |stress: usize| {
-        let of_steps = Sizes::of(&known, stress, |s| [s.step, s.element_mm])?;
-        let of_elements = Sizes::of(&known, stress, |s| [s.element_mm, s.step])?;
-        let left =
-            of_steps.left(own.step, 1.0) + of_elements.left(own.element_mm, of_elements.order());
+        let of_steps = Sizes::of(&known, stress, |s| [s.steps.length(), s.element_mm])?;
+        let of_elements = Sizes::of(&known, stress, |s| [s.element_mm, s.steps.length()])?;
+        let left = of_steps.left(own.steps.length(), 1.0)
+            + of_elements.left(own.element_mm, of_elements.order());
         Some((left + own.solver) * own.stresses_mpa[stress]?)
     };
     let strength = row.solved.as_ref()?.strength;
@@ -65,12 +65,18 @@ pub fn stated(row: &Row, rows: &[Row]) -> Option<Strength> {
     })
 }
 
-/// Relative error of load steps alone at a length `1 / steps`.
-pub fn of_steps(rows: &[Row], steps: usize) -> Option<f64> {
-    let known: Vec<Solve> = rows.iter().filter_map(Solve::of).collect();
+/// The solves whose load steps are chosen in the same way.
+fn alike(rows: &[Row], steps: LoadSteps) -> Vec<Solve> {
+    let solves = rows.iter().filter_map(Solve::of);
+    solves.filter(|s| s.steps.is_of_one_kind(steps)).collect()
+}
+
+/// Relative error of load steps alone.
+pub fn of_steps(rows: &[Row], steps: LoadSteps) -> Option<f64> {
+    let known = alike(rows, steps);
     let left = |stress: usize| {
-        let sizes = Sizes::of(&known, stress, |s| [s.step, s.element_mm])?;
-        Some(sizes.left(1.0 / steps as f64, 1.0))
+        let sizes = Sizes::of(&known, stress, |s| [s.steps.length(), s.element_mm])?;
+        Some(sizes.left(steps.length(), 1.0))
     };
     Some(left(1)?.max(left(0).unwrap_or(0.0)))
 }
@@ -138,12 +144,12 @@ mod tests {
     use crate::result::settings::Settings;
 
     /// Stresses that are off in proportion to both sizes: 100 (1 + h + step).
-    fn row(element_mm: f64, steps: u64) -> Row {
-        let stress = 100.0 * (1.0 + element_mm + 1.0 / steps as f64);
+    fn row(element_mm: f64, steps: u32) -> Row {
+        let stress = 100.0 * (1.0 + element_mm + 1.0 / f64::from(steps));
         Row {
             key: Settings {
                 lp_mm: element_mm,
-                steps: Some(steps),
+                steps: Some(LoadSteps::Even(steps)),
                 plasticity: Some("von-mises:68".to_owned()),
                 ..Settings::default()
             },
@@ -171,7 +177,7 @@ mod tests {
             assert_eq!(found.yield_stress_error_mpa, None);
             assert_eq!(found.error(), Some(error / found.max_stress_mpa.unwrap()));
         }
-        assert!((of_steps(&rows, 10).unwrap() - 0.1).abs() < 0.01);
+        assert!((of_steps(&rows, LoadSteps::Even(10)).unwrap() - 0.1).abs() < 0.01);
     }
 
     /// Elements whose error falls with the power 0.4, as where voxels meet in edges.
@@ -180,12 +186,12 @@ mod tests {
         let known: Vec<Solve> = [1.0, 0.5, 1.0 / 3.0]
             .map(|element_mm: f64| Solve {
                 element_mm,
-                step: 0.1,
+                steps: LoadSteps::Even(10),
                 stresses_mpa: [None, Some(2.2 + 5.6 * element_mm.powf(0.4))],
                 solver: 0.0,
             })
             .to_vec();
-        let sizes = Sizes::of(&known, 1, |s| [s.element_mm, s.step]).unwrap();
+        let sizes = Sizes::of(&known, 1, |s| [s.element_mm, s.steps.length()]).unwrap();
         assert!((sizes.order() - 0.4).abs() < 1e-6, "{}", sizes.order());
         let fine = 2.2 + 5.6 * (1.0_f64 / 3.0).powf(0.4);
         let left = fine * sizes.left(1.0 / 3.0, sizes.order());

@@ -7,6 +7,7 @@ use bonepd_ct::report::methods::{Criterion, Known, Segmented, Threshold, methods
 use bonepd_ct::report::{ReportParams, answers, report};
 use bonepd_ct::result::answer::ScanFacts;
 use bonepd_ct::result::condition::Condition;
+use bonepd_ct::result::load_steps::LoadSteps;
 use bonepd_ct::result::row::{FailureLoad, Row, Solution};
 use bonepd_ct::result::settings::{
     BoundaryRule, CellType, Conditions, Elements, Ends, Load, Method, Sed, Settings, Supports,
@@ -202,13 +203,28 @@ const ROWS: &[RowCase] = &[
     (
         |r| {
             r.key.plasticity = Some("von-mises:68".to_owned());
-            r.key.steps = Some(12);
+            r.key.steps = Some(LoadSteps::Even(12));
             r.solved.as_mut().unwrap().strength.yield_stress_mpa = Some(3.0);
         },
         &[
             "elastic up to yield",
             "law von-mises:68",
             "in 12 even steps",
+            "Newton",
+            "0.2 % strain",
+        ],
+        &["linear elastic"],
+    ),
+    (
+        |r| {
+            r.key.plasticity = Some("von-mises:68".to_owned());
+            r.key.steps = Some(LoadSteps::Adaptive(2));
+            r.solved.as_mut().unwrap().strength.yield_stress_mpa = Some(3.0);
+        },
+        &[
+            "elastic up to yield",
+            "law von-mises:68",
+            "in steps whose length followed the stress–strain curve, divided by 2",
             "Newton",
             "0.2 % strain",
         ],

@@ -4,8 +4,9 @@
 
 The program's element averages the dilatation (B-bar), C3D8 does not, and locks where tissue flows: so CalculiX solves the model as
 C3D20R on the same bricks, and as C3D8 for comparison. On voxels split once both must agree within 2 % in force at 1 % strain, where
-these meshes resolve the structure. Plates 1 to 2 voxels thick are a limit, shown and not counted; `--finer` adds their forces on coarser and
-finer bricks. (`cargo test -- --ignored fully_integrated` holds the fully integrated element to C3D8 itself, to 0.1 %.)
+these meshes resolve the structure. Plates 1 to 2 voxels thick and curved walls are limits, shown and not counted: their force still falls by
+6.8 and 2.9 % in C3D20R from whole to halved voxels, so these meshes are not near the limit that both programs tend to. `--finer` adds their
+forces on coarser and finer bricks. (`cargo test -- --ignored fully_integrated` holds the fully integrated element to C3D8 itself, to 0.1 %.)
 """
 
 import csv
@@ -20,7 +21,7 @@ from calculix import PROGRAM, SPECIMENS, calculix, is_missing, segmented
 LIMIT = 0.02
 LAW = "von-mises:68,500"
 SOLVE = ["--method", "voxel-fe", "--young-mpa", "10000", "--strain", "-1%", "--ends", "bonded", "--steps", "10"]
-LIMITS = ["plates"]
+LIMITS = ["plates", "walls"]
 EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
 
 
@@ -28,6 +29,11 @@ def walls(x, y, z):
     """Curved walls 3 to 4 voxels thick."""
     k = 0.3
     return int(abs(sin(k * x) * cos(k * y) + sin(k * y) * cos(k * z) + sin(k * z) * cos(k * x)) < 0.65)
+
+
+def frame(x, y, z):
+    """Struts of three voxels along the edges of a cube."""
+    return int(sum(v % 7 < 3 for v in (x, y, z)) >= 2)
 
 
 def solve(folder, refine):
@@ -89,7 +95,8 @@ def main():
     if is_missing():
         return
     worst = 0.0
-    specimens = {**SPECIMENS, "walls": ((10, 10, 10), (0.02, 0.02, 0.02), walls)}
+    small = (10, 10, 10), (0.02, 0.02, 0.02)
+    specimens = {**SPECIMENS, "frame": (*small, frame), "walls": (*small, walls)}
     with tempfile.TemporaryDirectory() as temporary:
         for name, (n, spacing, bone) in specimens.items():
             base = segmented(temporary, name, tuple(min(v, 14) for v in n), spacing, bone)

@@ -8,6 +8,7 @@ use bonepd_ct::physics::hex8::element::Integration;
 use bonepd_ct::physics::hex8::plastic::points::Points;
 use bonepd_ct::physics::hex8::plastic::{PlasticBricks, Tissue};
 use bonepd_ct::physics::plasticity::{DruckerPrager, Elastic, VonMises, YieldLaw};
+use bonepd_ct::pipeline::apparent::discretisation::steps::length::Lengths;
 use bonepd_ct::pipeline::apparent::discretisation::steps::{
     History, Loading, Outcome, Step, Stepping, load,
 };
@@ -73,9 +74,9 @@ impl Body {
         body
     }
 
-    pub fn stepping(steps: usize) -> Stepping {
+    pub fn stepping(steps: u32) -> Stepping {
         Stepping {
-            steps,
+            lengths: Lengths::Even(steps),
             halvings: 6,
             params: StepParams {
                 tolerance: 1e-10,

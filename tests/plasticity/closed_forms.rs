@@ -130,7 +130,7 @@ impl Sphere {
         Sphere { body, inner, outer }
     }
 
-    fn load(&mut self, pressure: f64, steps: usize) -> History {
+    fn load(&mut self, pressure: f64, steps: u32) -> History {
         let forces = self.body.forces.as_mut().unwrap();
         forces.iter_mut().flatten().for_each(|f| *f *= pressure);
         let mut how = Body::stepping(steps);

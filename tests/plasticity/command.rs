@@ -6,7 +6,7 @@ use crate::specimens::specimen;
 use bonepd_ct::io::table;
 use bonepd_ct::physics::plasticity::{Plasticity, VonMises, YieldLaw};
 use bonepd_ct::pipeline::apparent::job::JobResult;
-use bonepd_ct::pipeline::apparent::{Load, Method, SolveParams, of_voxels};
+use bonepd_ct::pipeline::apparent::{Load, LoadSteps, Method, SolveParams, of_voxels};
 use bonepd_ct::result::row::Row;
 use bonepd_ct::result::strength::CurvePoint;
 use std::path::Path;
@@ -90,6 +90,25 @@ fn a_solve_writes_its_row_its_curve_and_its_shares() {
             .is_file()
     );
     assert!(!Path::new(&out).join("load-steps.bin").exists());
+}
+
+/// Without `--steps` lengths follow the curve: what was taken stands in the curve and the note, how it was chosen in the column.
+#[test]
+fn steps_that_nobody_gave_follow_the_curve() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = segmented(dir.path());
+    let (code, words) = solve(&out, &[]);
+    assert_eq!(code, 0, "{words}");
+    let points = curve(&out);
+    assert!(points.len() < 10, "{points:?}");
+    let rows: Vec<Row> = table::read(&Path::new(&out).join("results.csv")).unwrap();
+    assert_eq!(rows[0].key.steps, Some(LoadSteps::Adaptive(1)));
+    let note = rows[0].marks.note.as_deref().unwrap();
+    let said = format!("then {} load steps", points.len());
+    assert!(note.contains(&said), "{note}");
+    assert!(!note.contains("more --steps"), "{note}");
+    let (code, words) = solve(&out, &["--steps", "adaptive"]);
+    assert!(code == 0 && words.contains("kept"), "{words}");
 }
 
 #[test]
@@ -193,7 +212,7 @@ fn what_turns_is_said_and_what_does_not_is_not() {
             load: Load::ShearX,
             young_mpa: 10_000.0,
             strain,
-            steps: 2,
+            steps: LoadSteps::Even(2),
             plasticity: Some(Plasticity::All(YieldLaw::VonMises(VonMises {
                 yield_mpa: 1e5,
                 hardening_mpa: 0.0,

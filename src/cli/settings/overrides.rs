@@ -39,7 +39,7 @@ mod tests {
     use bonepd_ct::physics::plasticity::{Plasticity, VonMises, YieldLaw};
     use bonepd_ct::pipeline::apparent::fields::Field;
     use bonepd_ct::pipeline::apparent::{
-        CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams,
+        CoarsenBy, Conditions, Ends, Load, LoadSteps, Method, Sed, SolveParams,
     };
     use bonepd_ct::pipeline::lattice::{BoundaryWord, LatticeParams, Structure};
     use bonepd_ct::pipeline::segment::{Align, AlignBox, SegmentParams, Voi};
@@ -246,7 +246,7 @@ mod tests {
                 yield_mpa: 68.0,
                 hardening_mpa: 5.0,
             }))),
-            steps: 7,
+            steps: LoadSteps::Even(7),
             refine: 3,
             refine_mask: true,
             ..start.clone()

@@ -8,7 +8,7 @@ use crate::command::ladder::split_voxels;
 use crate::command::solve::OpenScan;
 use crate::error::Result;
 use crate::machine::session::Session;
-use crate::pipeline::apparent::{SolveParams, of_voxels};
+use crate::pipeline::apparent::{LoadSteps, SolveParams, of_voxels};
 use crate::pipeline::lattice::LatticeParams;
 use crate::result::notes;
 use crate::result::row::Row;
@@ -17,8 +17,8 @@ use crate::result::strength_error::{HOLDS, of_steps, stated};
 /// Share of the target that is left to the load steps.
 const STEPS_SHARE: f64 = 0.25;
 
-/// Load steps are not doubled beyond.
-const MOST_STEPS: usize = 160;
+/// Lengths of load steps are halved so many times at most.
+const HALVINGS: u32 = 4;
 
 /// Elements a voxel along each axis, after one.
 const SPLIT: [usize; 2] = [2, 3];
@@ -59,10 +59,13 @@ impl Climb<'_> {
         if self.is_disconnected() {
             return Ok(());
         }
-        self.step(1, 2 * steps)?;
-        while self.steps_leave_open(steps) && 4 * steps <= MOST_STEPS {
-            steps *= 2;
-            self.step(1, 2 * steps)?;
+        self.step(1, steps.halved())?;
+        for _ in 1..HALVINGS {
+            if !self.steps_leave_open(steps) {
+                break;
+            }
+            steps = steps.halved();
+            self.step(1, steps.halved())?;
         }
         for split in SPLIT {
             if let Err(refused) = self.fits(split) {
@@ -78,7 +81,7 @@ impl Climb<'_> {
         Ok(())
     }
 
-    fn params(&self, split: usize, steps: usize) -> SolveParams {
+    fn params(&self, split: usize, steps: LoadSteps) -> SolveParams {
         SolveParams {
             steps,
             ..split_voxels(self.params, split)
@@ -86,7 +89,7 @@ impl Climb<'_> {
     }
 
     /// Solves, and states the errors that the rows so far say together.
-    fn step(&mut self, split: usize, steps: usize) -> Result<()> {
+    fn step(&mut self, split: usize, steps: LoadSteps) -> Result<()> {
         let params = self.params(split, steps);
         let rows = self
             .scan
@@ -111,7 +114,7 @@ impl Climb<'_> {
         self.scan.results().edit_rows(put)
     }
 
-    fn steps_leave_open(&self, steps: usize) -> bool {
+    fn steps_leave_open(&self, steps: LoadSteps) -> bool {
         of_steps(&self.rows, steps).is_some_and(|open| open > STEPS_SHARE * self.target)
     }
 

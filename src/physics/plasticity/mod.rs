@@ -174,10 +174,25 @@ impl YieldLaw {
 
     /// Whether an elastic strain passes the yield surface of a point that has never flowed: what the cheap look at elements asks.
     pub fn yields(&self, elastic: &Elastic, strain: &Tensor) -> bool {
-        let trial = Trial::of(&elastic.stress(strain));
+        self.excess_at_first(&Trial::of(&elastic.stress(strain))) > 0.0
+    }
+
+    /// The share of an elastic strain at which a point that has never flowed begins to; infinite where none does. Both yield functions
+    /// are in proportion to the stress, but for a constant.
+    pub fn share_that_yields(&self, elastic: &Elastic, strain: &Tensor) -> f64 {
+        let resists = -self.excess_at_first(&Trial::of(&[0.0; 6]));
+        let driven = resists + self.excess_at_first(&Trial::of(&elastic.stress(strain)));
+        match driven > 0.0 {
+            true => resists / driven,
+            false => f64::INFINITY,
+        }
+    }
+
+    /// The yield function of a point that has never flowed, MPa; above 0 it flows.
+    fn excess_at_first(&self, trial: &Trial) -> f64 {
         match self {
-            YieldLaw::VonMises(law) => law.excess(&trial, 0.0) > 0.0,
-            YieldLaw::Asymmetric(law) => law.excess(&trial, 0.0) > 0.0,
+            YieldLaw::VonMises(law) => law.excess(trial, 0.0),
+            YieldLaw::Asymmetric(law) => law.excess(trial, 0.0),
         }
     }
 }

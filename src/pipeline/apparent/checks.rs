@@ -151,13 +151,6 @@ fn check_plasticity(params: &SolveParams) -> Result<()> {
         };
     };
     plasticity.check()?;
-    if params.steps == 0 {
-        return wrong(
-            "solve.steps",
-            "0 load steps load nothing",
-            "give 1 or more (usual: 10)",
-        );
-    }
     if params.method == Method::Lattice {
         return wrong(
             "solve.plasticity",

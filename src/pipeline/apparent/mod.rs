@@ -49,7 +49,7 @@ use crate::volume::Specimen;
 #[doc(hidden)]
 pub use discretisation::Discretisation;
 pub use fields::Field;
-pub use params::{CoarsenBy, Conditions, Ends, Load, Method, Sed, SolveParams};
+pub use params::{CoarsenBy, Conditions, Ends, Load, LoadSteps, Method, Sed, SolveParams};
 
 /// The solves that the settings name, in the order of their rows.
 #[doc(hidden)]

@@ -6,6 +6,7 @@ use crate::measure::pistoia::Pistoia;
 use crate::physics::material::Material;
 use crate::physics::plasticity::Plasticity;
 use crate::pipeline::apparent::fields::Field;
+pub use crate::result::load_steps::LoadSteps;
 pub use crate::result::settings::{Conditions, Ends, Load, Method, Sed};
 use serde::{Deserialize, Serialize};
 
@@ -35,8 +36,8 @@ pub struct SolveParams {
     /// voxel-fe: how tissue yields. None: it is elastic.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plasticity: Option<Plasticity>,
-    /// Of plasticity: even load steps, halved where one fails.
-    pub steps: usize,
+    /// Of plasticity: how the load grows. A step that fails is halved.
+    pub steps: LoadSteps,
     /// Nominal strain u / L_g; negative is compression.
     #[serde(deserialize_with = "percent::deserialize")]
     pub strain: f64,
@@ -92,7 +93,7 @@ impl Default for SolveParams {
             poisson: 0.3,
             material: None,
             plasticity: None,
-            steps: 10,
+            steps: LoadSteps::default(),
             strain: -0.01,
             grip_mm: 0.0,
             load: Load::Uniaxial,

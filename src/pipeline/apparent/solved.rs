@@ -128,7 +128,7 @@ impl SolveParams {
             bv_tv: specimen.bv_tv(),
             tolerance: Some(self.tolerance),
             plasticity: self.plasticity.as_ref().map(Plasticity::words),
-            steps: self.plasticity.as_ref().map(|_| self.steps as u64),
+            steps: self.plasticity.as_ref().map(|_| self.steps),
             sed: (self.method != Method::Lattice && self.load != Load::Stiffness)
                 .then_some(self.sed),
             ..Settings::default()

@@ -7,6 +7,7 @@ use crate::physics::hex8::element::{FULL_POISSON, MEAN_POISSON};
 use crate::physics::material::formula;
 use crate::report::{Report, distinct};
 use crate::result::condition::{Condition, Tissue};
+use crate::result::load_steps::LoadSteps;
 use crate::result::row::Row;
 use crate::result::settings::{BoundaryRule, CellType, Elements, Method};
 
@@ -261,9 +262,16 @@ pub fn tissue(condition: &Condition, answered: &[Answered]) -> String {
         text = text.replacen("linear elastic", "elastic up to yield", 1);
         text += &format!(" It yielded by the law {law} (stresses in MPa).");
         if let Some(steps) = steps {
-            text += &format!(
-                " The load was applied in {steps} even steps; a step that failed was halved."
-            );
+            let steps = match steps {
+                LoadSteps::Even(steps) => format!("{steps} even steps"),
+                LoadSteps::Adaptive(1) => {
+                    "steps whose length followed the stress–strain curve".to_owned()
+                }
+                LoadSteps::Adaptive(n) => {
+                    format!("steps whose length followed the stress–strain curve, divided by {n}")
+                }
+            };
+            text += &format!(" The load was applied in {steps}; a step that failed was halved.");
         }
     }
     text

@@ -1,6 +1,7 @@
 //! Owns the columns of `results.csv`, in their order. Missing values are `None` here and `NA` in the file.
 
 use crate::grid::Axis;
+use crate::result::load_steps::LoadSteps;
 use crate::result::notes::NO_ANSWER;
 use crate::result::row::{FailureLoad, Marks, Row, Solution};
 use crate::result::settings::{
@@ -89,7 +90,7 @@ pub(super) struct Columns {
     #[serde(default)]
     plasticity: Option<String>,
     #[serde(default)]
-    steps: Option<u64>,
+    steps: Option<LoadSteps>,
     #[serde(default)]
     yield_stress_mpa: Option<f64>,
     #[serde(default)]

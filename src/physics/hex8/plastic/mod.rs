@@ -1,9 +1,11 @@
 //! Owns voxel elements that yield: linear bricks, and a state at the points of those alone that have ever flowed. Internal forces are
 //! those of the linear kernel and, of yielded elements, what their plastic strains take off.
 
+mod onset;
 pub mod points;
 mod tangent;
 
+pub use onset::Onset;
 pub use tangent::Tangent;
 
 use crate::discretisation::voxels::VoxelMesh;

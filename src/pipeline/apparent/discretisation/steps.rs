@@ -1,9 +1,12 @@
-//! Owns the load steps of a body that yields: even ones, halved where one fails, and what each came to.
+//! Owns the load steps of a body that yields: how they are taken, halved where one fails, and what each came to.
+
+pub mod length;
 
 use crate::operator::SinglePreconditioner;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::physics::hex8::plastic::{Balance, PlasticBricks, State, Tissue};
+use crate::pipeline::apparent::discretisation::steps::length::Lengths;
 use crate::solver::load_step::{Balanced, Bounds, StepParams, Workspace, balance, work_between};
 
 /// Supports and load. The load grows from 0 to 1.
@@ -19,8 +22,8 @@ pub struct Loading<'a> {
 /// How the load grows, and how exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stepping {
-    /// Even steps from 0 to the whole load.
-    pub steps: usize,
+    /// From 0 to the whole load.
+    pub lengths: Lengths,
     /// A step is halved so many times at most.
     pub halvings: u32,
     /// How exactly each step is balanced.
@@ -68,13 +71,16 @@ pub struct History {
 }
 
 /// How steps ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
     /// The whole load.
     Done,
     /// No equilibrium was found beyond the last step, however small the next: the body bears no more, or flows faster than its tangent
     /// foresees.
-    Stopped,
+    Stopped {
+        /// Length of the last step that was tried, as a share of the load.
+        length: f64,
+    },
 }
 
 impl History {
@@ -128,8 +134,13 @@ pub fn load<E: Coarsen, T: Fn(usize) -> Tissue + Sync>(
     let mut work = Workspace::new(history.u.len());
     let mut cuts = 0;
     let mut ended = Outcome::Done;
+    let onset = match how.lengths {
+        Lengths::Even(_) => None,
+        Lengths::Adaptive(_) => Some(body.onset(loading.elastic)),
+    };
     while history.load() < 1.0 {
-        let length = 1.0 / how.steps as f64 * 0.5f64.powi(history.halved as i32);
+        let whole = how.lengths.next(&history.steps, onset.as_ref());
+        let length = whole * 0.5f64.powi(history.halved as i32);
         // Sums of steps fall short of 1 by rounding.
         let load = match history.load() + length {
             load if load > 1.0 - 1e-9 => 1.0,
@@ -153,7 +164,7 @@ pub fn load<E: Coarsen, T: Fn(usize) -> Tissue + Sync>(
         );
         let Ok(found) = found else {
             if history.halved >= how.halvings {
-                ended = Outcome::Stopped;
+                ended = Outcome::Stopped { length };
                 break;
             }
             history.halved += 1;

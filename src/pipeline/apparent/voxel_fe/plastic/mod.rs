@@ -8,11 +8,13 @@ use crate::physics::hex8::plastic::points::Points;
 use crate::physics::hex8::plastic::{PlasticBricks, Tissue as Yielder};
 use crate::physics::plasticity::{Elastic, Plasticity, YieldLaw};
 use crate::pipeline::apparent::discretisation::Displacements;
+use crate::pipeline::apparent::discretisation::steps::length::{Adaptive, Lengths};
 use crate::pipeline::apparent::discretisation::steps::{History, Loading, Outcome, Stepping, load};
 use crate::pipeline::apparent::discretisation::yielded::{Kept, Yielded};
-use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::params::{LoadSteps, SolveParams};
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::VoxelModel;
+use crate::result::strength::OFFSET;
 use crate::solver::amg::Amg;
 use crate::solver::load_step::StepParams;
 
@@ -45,6 +47,7 @@ impl VoxelModel {
             }
         };
         let points = Points::new(mesh.grid.spacing_mm, true);
+        let strain = self.motion.loaded.displacement_mm / self.motion.loaded.gauge_mm;
         let preconditioner = Amg::new(&self.bricks, held, &self.multigrid());
         let loading = Loading {
             held,
@@ -62,7 +65,7 @@ impl VoxelModel {
             body,
             &loading,
             &preconditioner,
-            &stepping(&self.params),
+            &stepping(&self.params, strain),
             &mut history,
             |history| match kept.keep(history) {
                 Ok(()) => true,
@@ -123,9 +126,16 @@ impl VoxelModel {
     }
 }
 
-fn stepping(params: &SolveParams) -> Stepping {
+/// `strain`: of the ends under the whole load.
+fn stepping(params: &SolveParams, strain: f64) -> Stepping {
     Stepping {
-        steps: params.steps,
+        lengths: match params.steps {
+            LoadSteps::Even(steps) => Lengths::Even(steps),
+            LoadSteps::Adaptive(divided) => Lengths::Adaptive(Adaptive {
+                offset: OFFSET / strain.abs(),
+                divided,
+            }),
+        },
         halvings: HALVINGS,
         params: StepParams {
             tolerance: BALANCED * params.tolerance,
@@ -168,13 +178,14 @@ impl Solids {
 }
 
 /// How steps that ended early are named.
-fn stopped_in_words(outcome: Outcome, history: &History, steps: usize) -> Option<String> {
+fn stopped_in_words(outcome: Outcome, history: &History) -> Option<String> {
     let last = history.steps.last().map_or(0.0, |s| s.load);
-    (outcome == Outcome::Stopped).then(|| {
-        format!(
+    match outcome {
+        Outcome::Done => None,
+        Outcome::Stopped { length } => Some(format!(
             "not converged: no equilibrium was found beyond {:.1} % of the load, in steps of {:.2} %",
             100.0 * last,
-            100.0 * 0.5f64.powi(HALVINGS as i32) / steps as f64
-        )
-    })
+            100.0 * length
+        )),
+    }
 }

@@ -36,7 +36,7 @@ impl VoxelModel {
             "elements integrated by mean dilatation; elastic modulus, then {} load steps",
             history.steps.len()
         )];
-        said.extend(stopped_in_words(outcome, &history, self.params.steps));
+        said.extend(stopped_in_words(outcome, &history));
         let cuts: u32 = history.steps.iter().map(|s| s.cuts).sum();
         if cuts > 0 {
             said.push(format!("{cuts} load steps failed and were halved"));
@@ -59,7 +59,7 @@ impl VoxelModel {
             yielding: Yielding {
                 curve: self.curve(&history.steps),
                 shares,
-                stopped: outcome == Outcome::Stopped,
+                stopped: outcome != Outcome::Done,
                 said,
             },
             u: history.u,

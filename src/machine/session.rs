@@ -46,7 +46,7 @@ pub struct Output {
     /// Warnings of a run so far: one that says the same of another scan waits for the end.
     warned: Option<Arc<Mutex<Alikes>>>,
     /// Of a program that calls the library: its warnings, which the terminal does not show.
-    told: Option<Arc<Mutex<Vec<String>>>>,
+    collected: Option<Arc<Mutex<Vec<String>>>>,
 }
 
 impl Session {
@@ -58,7 +58,7 @@ impl Session {
             json: true,
             output: Output {
                 bars_shown: Some(bars),
-                told: Some(Arc::default()),
+                collected: Some(Arc::default()),
                 ..Output::default()
             },
             ..Session::default()
@@ -67,10 +67,10 @@ impl Session {
 
     /// The warnings so far of a session of [`Session::of_caller`]; of any other there are none.
     pub fn warnings(&self) -> Vec<String> {
-        let told = self.output.told.as_ref();
-        told.map_or(Vec::new(), |told| {
-            let told = told.lock().expect("no one panics while adding a line");
-            told.clone()
+        let collected = self.output.collected.as_ref();
+        collected.map_or(Vec::new(), |collected| {
+            let collected = collected.lock().expect("no one panics while adding a line");
+            collected.clone()
         })
     }
 
@@ -168,10 +168,10 @@ impl Session {
     }
 
     fn put_warning(&self, line: String) {
-        match &self.output.told {
-            Some(told) => {
-                let mut told = told.lock().expect("no one panics while adding a line");
-                told.push(line);
+        match &self.output.collected {
+            Some(collected) => {
+                let mut collected = collected.lock().expect("no one panics while adding a line");
+                collected.push(line);
             }
             None => self.put(&format!("warning: {line}")),
         }

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::grid::Axis;
 use crate::io::{atomic, table};
 use crate::result::details::{Details, EndForces, FailureAt, SectionShare, TissueSpread};
-use crate::result::load_steps::LoadSteps;
+use crate::result::settings::load_steps::LoadSteps;
 use crate::result::settings::{BoundaryRule, CellType, Load, Method, Sed, Settings, Supports};
 use crate::result::strength::{CurvePoint, YieldedShare};
 use serde::Serialize;

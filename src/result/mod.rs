@@ -8,7 +8,6 @@ pub mod details;
 pub mod extrapolate;
 pub mod ffb;
 pub mod load;
-pub mod load_steps;
 pub mod notes;
 pub mod row;
 pub mod settings;

@@ -1,10 +1,12 @@
 //! Owns what a row of results follows from: the scan, the method, the load, the supports and the tissue.
 
+pub mod load_steps;
+
 use crate::discretisation::lattice::placement::Boundary;
 use crate::discretisation::lattice::stencil::Structure;
 use crate::grid::Axis;
 pub use crate::result::load::{Conditions, Ends, Load, Motion, Sed};
-use crate::result::load_steps::LoadSteps;
+use load_steps::LoadSteps;
 use serde::{Deserialize, Serialize};
 
 /// Column `method`: how a specimen is discretised.

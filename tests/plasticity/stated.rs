@@ -5,7 +5,7 @@ use crate::cli::run;
 use crate::specimens::specimen;
 use bonepd_ct::io::table;
 use bonepd_ct::record::answer;
-use bonepd_ct::result::load_steps::LoadSteps;
+use bonepd_ct::result::settings::load_steps::LoadSteps;
 use bonepd_ct::result::row::Row;
 use std::path::Path;
 

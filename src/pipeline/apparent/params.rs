@@ -6,7 +6,7 @@ use crate::measure::pistoia::Pistoia;
 use crate::physics::material::Material;
 use crate::physics::plasticity::Plasticity;
 use crate::pipeline::apparent::fields::Field;
-pub use crate::result::load_steps::LoadSteps;
+pub use crate::result::settings::load_steps::LoadSteps;
 pub use crate::result::settings::{Conditions, Ends, Load, Method, Sed};
 use serde::{Deserialize, Serialize};
 

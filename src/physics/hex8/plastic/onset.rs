@@ -8,7 +8,7 @@ use crate::par::CHUNK;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Loads are told apart in so many equal parts of the whole.
+/// The whole load is divided into so many equal parts.
 const PARTS: usize = 1000;
 
 /// The elastic response to a load that grows in proportion from 0 to 1.

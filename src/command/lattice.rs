@@ -1,5 +1,7 @@
 //! Owns `lattice` on disk: builds the lattices of a segmented scan, reports their counts, exports them.
 
+pub(super) mod picture;
+
 use crate::command::estimate::refuse_lattice_that_does_not_fit;
 use crate::discretisation::lattice::connected::ConnectedSites;
 use crate::discretisation::lattice::sites::Sites;

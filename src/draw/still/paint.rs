@@ -12,7 +12,7 @@ const BONE: [u8; 3] = [238, 226, 202];
 
 /// How far below the surface a field is taken, and from how far around, in voxels.
 const BELOW: f32 = 0.75;
-const AROUND: f32 = 1.75;
+const AROUND: f32 = 1.5;
 
 /// Light of one pixel, red, green and blue; 1 is white paper.
 pub(super) type Light = [f32; 3];

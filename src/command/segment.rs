@@ -332,7 +332,7 @@ fn write(
 fn pictures(dir: &Path, scan: &Volume<f32>, specimen: &Specimen) -> Result<()> {
     let bone = &specimen.bone;
     picture::write(&dir.join(specimen::PICTURE), scan, bone)?;
-    map::write_png(&dir.join(specimen::STILL), &still::bone(bone, Axis::Z))?;
+    map::write_shaded_png(&dir.join(specimen::STILL), still::bone(bone, Axis::Z))?;
     let view = view::page(&specimen.name, bone, Axis::Z, None);
     atomic::write(&dir.join(specimen::VIEW), view)?;
     // Sites of lattices of another mask.

@@ -18,9 +18,9 @@ use serde::Serialize;
 #[derive(Debug, Clone, Default)]
 pub struct ScanPage {
     pub scan: String,
-    /// Pictures as PNG, each with its caption: the bone, slices, sites, fields.
+    /// Pictures as PNG, each with its caption: the bone, slices, fields.
     pub pictures: Vec<(String, Vec<u8>)>,
-    /// Views that turn under the mouse: what each shows, and its file next to the page.
+    /// Views that turn under the mouse and further pictures: what each shows, and its file next to the page.
     pub views: Vec<(String, String)>,
     /// Key and value: what is known of the input, the segmentation, the solve.
     pub facts: Vec<(String, String)>,

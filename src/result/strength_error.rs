@@ -4,8 +4,8 @@
 //! several voxels thick, 0.4 where voxels meet in edges (`reports/strength.md`). The power is fitted to three sizes; of two it is taken for
 //! 1/2. With the power `p` a difference between two sizes leaves `sizeᵖ / (largerᵖ − smallerᵖ)` times as much at `size`.
 
-use crate::result::settings::load_steps::LoadSteps;
 use crate::result::row::Row;
+use crate::result::settings::load_steps::LoadSteps;
 use crate::result::strength::Strength;
 
 /// What the stated errors hold, and what they do not.

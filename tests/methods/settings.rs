@@ -7,8 +7,8 @@ use bonepd_ct::report::methods::{Criterion, Known, Segmented, Threshold, methods
 use bonepd_ct::report::{ReportParams, answers, report};
 use bonepd_ct::result::answer::ScanFacts;
 use bonepd_ct::result::condition::Condition;
-use bonepd_ct::result::settings::load_steps::LoadSteps;
 use bonepd_ct::result::row::{FailureLoad, Row, Solution};
+use bonepd_ct::result::settings::load_steps::LoadSteps;
 use bonepd_ct::result::settings::{
     BoundaryRule, CellType, Conditions, Elements, Ends, Load, Method, Sed, Settings, Supports,
 };

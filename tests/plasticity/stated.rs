@@ -5,8 +5,8 @@ use crate::cli::run;
 use crate::specimens::specimen;
 use bonepd_ct::io::table;
 use bonepd_ct::record::answer;
-use bonepd_ct::result::settings::load_steps::LoadSteps;
 use bonepd_ct::result::row::Row;
+use bonepd_ct::result::settings::load_steps::LoadSteps;
 use std::path::Path;
 
 fn segmented(dir: &Path, n: [usize; 3], bone: impl Fn([usize; 3]) -> bool) -> String {

@@ -40,7 +40,7 @@ pub(super) fn write(
     }
     let bone = &specimen.bone;
     let picture = still::field(bone, &coloured, load);
-    map::write_png(&dir.join(format!("field-{stem}{STILL}")), &picture)?;
+    map::write_shaded_png(&dir.join(format!("field-{stem}{STILL}")), picture)?;
     let page = view::page(&specimen.name, bone, load, Some(&coloured));
     atomic::write(&dir.join(format!("view-{stem}.html")), page)
 }

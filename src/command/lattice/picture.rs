@@ -35,7 +35,7 @@ pub(super) fn write(dir: &Path, specimen: &Specimen, drawn: &[ShownLattice]) -> 
     if drawn.iter().all(|lattice| lattice.kinds.is_empty()) {
         return Ok(());
     }
-    map::write_png(&dir.join(SITES), &lattices(&specimen.bone, drawn))
+    map::write_shaded_png(&dir.join(SITES), lattices(&specimen.bone, drawn))
 }
 
 /// The firm and the floppy lattice of the first structure that has the largest lattice parameter; firm first, as in the paper.

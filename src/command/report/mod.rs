@@ -240,7 +240,6 @@ fn page((scan, folder): (&str, Option<&Folder>)) -> ScanPage {
             specimen::PICTURE,
             "Mid-slices of the three planes, with the outline of the mask",
         ),
-        picture(specimen::SITES, SITES),
     ];
     ScanPage {
         scan: scan.to_owned(),
@@ -258,9 +257,8 @@ fn page((scan, folder): (&str, Option<&Folder>)) -> ScanPage {
     }
 }
 
-/// Captions.
+/// Caption.
 const STILL: &str = "The bone within the box of the scan, smoothed; parallel view, so that the scale bar holds in all of the picture; z is the long axis";
-const SITES: &str = "Sites of the coarsest firm and floppy lattice over the bone; those that bone hides are half seen. Left the whole specimen, right a part of it";
 
 /// `stiffness.csv`, where a scan has a stiffness.
 fn stiffness_table(rows: &[Row], folders: &Folders) -> Option<(String, Vec<u8>)> {

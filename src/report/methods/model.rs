@@ -7,8 +7,8 @@ use crate::physics::hex8::element::{FULL_POISSON, MEAN_POISSON};
 use crate::physics::material::formula;
 use crate::report::{Report, distinct};
 use crate::result::condition::{Condition, Tissue};
-use crate::result::settings::load_steps::LoadSteps;
 use crate::result::row::Row;
+use crate::result::settings::load_steps::LoadSteps;
 use crate::result::settings::{BoundaryRule, CellType, Elements, Method};
 
 /// One sentence or more for each kind of model that answers.

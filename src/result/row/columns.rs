@@ -1,9 +1,9 @@
 //! Owns the columns of `results.csv`, in their order. Missing values are `None` here and `NA` in the file.
 
 use crate::grid::Axis;
-use crate::result::settings::load_steps::LoadSteps;
 use crate::result::notes::NO_ANSWER;
 use crate::result::row::{FailureLoad, Marks, Row, Solution};
+use crate::result::settings::load_steps::LoadSteps;
 use crate::result::settings::{
     BoundaryRule, CellType, Elements, Load, Method, Sed, Settings, Supports,
 };

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// Lay lattices over a segmented scan: count sites and bonds, and export them
 ///
 /// One lattice per structure, lattice parameter and boundary. The settings are kept in DIR/lattice.json, where `solve`
-/// finds them.
+/// finds them. DIR/sites.png shows the coarsest firm and floppy lattice over the bone.
 #[derive(Args)]
 pub struct LatticeArgs {
     /// Folder of a segmented scan

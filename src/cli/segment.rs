@@ -15,8 +15,9 @@ use std::path::PathBuf;
 
 /// Find the bone in a scan: crop, turn, smooth, threshold, volume of interest, largest connected piece
 ///
-/// Writes DIR/mask.nii.gz (1 where bone), DIR/segment.json (what is needed to repeat it, BV, TV, BV/TV) and
-/// DIR/segment.png (mid-slices with the mask's outline).
+/// Writes DIR/mask.nii.gz (1 where bone), DIR/segment.json (what is needed to repeat it, BV, TV, BV/TV),
+/// DIR/segment.png (mid-slices with the mask's outline), DIR/bone.png (the bone in three dimensions) and DIR/view.html (to turn
+/// it in a browser).
 #[derive(Args)]
 pub struct SegmentArgs {
     /// The scan: a file (.nii, .nii.gz, .tif, ...) or a folder of slices

@@ -117,7 +117,7 @@ pub struct SolveSettings {
     /// of a site), nodal-force (N); of voxel-fe also von-mises (MPa), effective-strain, strain and stress (xx, yy, zz, yz, xz,
     /// xy; engineering shears), principal-strain and principal-stress (values and directions),
     /// with --plasticity plastic-strain; of geometry-fe displacement, sed, von-mises, effective-strain, strain and stress. Of voxel-fe
-    /// as NIfTI on the scan's grid and fields.vti for ParaView, of a lattice as fields-LATTICE.vtk, by site, of geometry-fe as
+    /// as NIfTI on the scan's grid, fields.vti for ParaView and pictures, of a lattice as fields-LATTICE.vtk, by site, of geometry-fe as
     /// fields-geometry-fe.vtu [default: none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::choice::<Field>(Field::WORDS), hide_possible_values = true)]
     fields: Vec<Field>,

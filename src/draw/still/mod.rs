@@ -20,7 +20,7 @@ use image::RgbImage;
 use paint::{Painted, Plain};
 
 /// Pixels of a specimen's longer side.
-const SIDE: f32 = 800.0;
+const SIDE: f32 = 640.0;
 
 /// The bone, plain.
 pub fn bone(bone: &Volume<u8>, load: Axis) -> RgbImage {

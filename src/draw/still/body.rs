@@ -14,6 +14,9 @@ pub(super) const SURFACE: f32 = 127.5;
 /// Voxels a side of the blocks whose bone fractions give the ambient light.
 const BLOCK: usize = 4;
 
+/// Cells a side of the blocks that a ray passes in one step.
+pub(super) const LEAP: usize = 8;
+
 /// The bone, on a grid with one voxel more at each side that repeats the outermost. A point `q` of this grid has whole
 /// coordinates in the middles of voxels.
 pub(super) struct Body {
@@ -27,6 +30,8 @@ pub(super) struct Body {
     soft: Vec<u8>,
     /// The highest density of the eight corners of the cell after a voxel.
     high: Vec<u8>,
+    /// The highest of `high` in blocks of [`LEAP`] cells a side: where it is low, a ray passes the block in one step.
+    high_blocks: Blocks,
     /// Smoothed bone fractions of blocks.
     blocks: Blocks,
     /// Voxels of the mask a side of a voxel here.
@@ -60,6 +65,7 @@ impl Body {
                 .spacing_mm
                 .map(|s| (s * reduced.factor as f64) as f32),
             blocks: Blocks::new(&padded, n),
+            high_blocks: Blocks::highest(&high, n),
             density,
             soft,
             high,
@@ -75,6 +81,20 @@ impl Body {
     /// Whether the surface can run through a cell.
     pub(super) fn is_near(&self, cell: [usize; 3]) -> bool {
         f32::from(self.high[self.index(cell)]) >= SURFACE
+    }
+
+    /// Whether the surface can run through a cell of the block that holds this one.
+    pub(super) fn is_near_block(&self, cell: [usize; 3]) -> bool {
+        let [x, y, z] = cell.map(|c| c / LEAP);
+        let n = self.high_blocks.n;
+        f32::from(self.high_blocks.share[x + n[0] * (y + n[1] * z)]) >= SURFACE
+    }
+
+    /// The same body, whose rays go cell by cell.
+    #[cfg(test)]
+    pub(super) fn without_leaps(mut self) -> Body {
+        self.high_blocks.share.fill(255);
+        self
     }
 
     pub(super) fn density(&self, q: Vec3) -> f32 {
@@ -122,6 +142,23 @@ impl Blocks {
         Blocks {
             n: blocks,
             share: smoothed(&share, blocks),
+        }
+    }
+}
+
+impl Blocks {
+    fn highest(high: &[u8], n: [usize; 3]) -> Blocks {
+        let blocks = n.map(|n| n.div_ceil(LEAP));
+        let of_block = |at: [usize; 3]| {
+            let [xs, ys, zs] =
+                std::array::from_fn(|a| at[a] * LEAP..((at[a] + 1) * LEAP).min(n[a]));
+            let rows = zs.flat_map(|z| ys.clone().map(move |y| n[0] * (y + n[1] * z)));
+            let values = rows.flat_map(|row| &high[row + xs.start..row + xs.end]);
+            values.copied().max().unwrap_or(0)
+        };
+        Blocks {
+            n: blocks,
+            share: fill(blocks, of_block),
         }
     }
 }

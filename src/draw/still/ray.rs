@@ -1,6 +1,6 @@
 //! Owns where a ray meets the bone.
 
-use super::body::{Body, SURFACE};
+use super::body::{Body, LEAP, SURFACE};
 use super::vec3::{Vec3, along};
 
 /// A place on the bone.
@@ -78,16 +78,26 @@ impl Ray {
     fn walk(&self, body: &Body, start: f32, leave: f32, mut before: f32) -> Option<f32> {
         let q = self.at(start);
         let last = body.n.map(|n| n as i32 - 2);
-        let mut cell: [i32; 3] = std::array::from_fn(|a| (q[a] as i32).clamp(0, last[a]));
-        let mut next: Vec3 = std::array::from_fn(|a| {
-            let plane = cell[a] as f32 + if self.towards[a] > 0.0 { 1.0 } else { 0.0 };
-            (plane - self.from[a]) / self.towards[a]
-        });
+        let cell_at =
+            |q: Vec3| -> [i32; 3] { std::array::from_fn(|a| (q[a] as i32).clamp(0, last[a])) };
+        let mut cell = cell_at(q);
+        let mut next = self.leaves(cell, 1);
         let step: Vec3 = self.towards.map(|d| (1.0 / d).abs());
         let turn = self.towards.map(|d| if d > 0.0 { 1 } else { -1 });
         let mut t = start;
         let mut is_known = true;
         while t < leave {
+            if !body.is_near_block(cell.map(|c| c as usize)) {
+                let end = self.leaves(cell, LEAP as i32);
+                let end = end[0].min(end[1]).min(end[2]);
+                // A little further, so that rounding does not leave it where it was.
+                let ahead = cell_at(self.at(end + 1e-3 * step[0].min(step[1]).min(step[2])));
+                if end > t && ahead != cell {
+                    (t, cell, is_known) = (end, ahead, false);
+                    next = self.leaves(cell, 1);
+                    continue;
+                }
+            }
             let a = if next[0] <= next[1] && next[0] <= next[2] {
                 0
             } else if next[1] <= next[2] {
@@ -124,6 +134,14 @@ impl Ray {
             next[a] += step[a];
         }
         None
+    }
+
+    /// Where the ray leaves the block of `side` cells that holds a cell, by axis.
+    fn leaves(&self, cell: [i32; 3], side: i32) -> Vec3 {
+        std::array::from_fn(|a| {
+            let block = cell[a] / side + i32::from(self.towards[a] > 0.0);
+            ((block * side) as f32 - self.from[a]) / self.towards[a]
+        })
     }
 
     fn crossing(
@@ -174,6 +192,36 @@ mod tests {
                 .hit(&body)
                 .is_none()
         );
+    }
+
+    #[test]
+    fn leaps_over_empty_blocks_change_no_hit() {
+        let (n, spacing_mm) = ([50, 41, 34], [0.1, 0.11, 0.13]);
+        let sphere = |i: usize, [x, y, z]: [f64; 3], r: f64| {
+            let at = [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])].map(|c| c as f64);
+            (at[0] - x).powi(2) + (at[1] - y).powi(2) + (at[2] - z).powi(2) < r * r
+        };
+        let is_bone = |i| sphere(i, [9.0, 30.0, 5.0], 4.3) || sphere(i, [38.0, 11.0, 25.0], 6.1);
+        let grid = Grid::new(n, spacing_mm);
+        let made = || {
+            let mask = (0..grid.len()).map(|i| u8::from(is_bone(i))).collect();
+            Body::new(&Volume::from_vec(grid, mask))
+        };
+        let (leaping, stepping) = (made(), made().without_leaps());
+        let mut met = 0;
+        for i in 0..4000 {
+            let [a, b] = [f64::from(i % 63) * 0.1, f64::from(i / 63) * 0.1].map(|v| v as f32);
+            let towards = crate::draw::still::vec3::unit([0.6, -0.5, 0.62]);
+            let from = [a - 3.0, 6.0 - 0.3 * a, b - 2.5];
+            let hit = |body| Ray::new(body, from, towards).hit(body).map(|hit| hit.depth);
+            let (fast, slow) = (hit(&leaping), hit(&stepping));
+            met += usize::from(slow.is_some());
+            match (fast, slow) {
+                (Some(fast), Some(slow)) => assert!((fast - slow).abs() < 1e-3, "{fast} {slow}"),
+                (fast, slow) => assert_eq!(fast.is_some(), slow.is_some(), "{from:?}"),
+            }
+        }
+        assert!(met > 200, "{met}");
     }
 
     #[test]

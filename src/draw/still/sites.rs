@@ -216,14 +216,15 @@ impl View {
             let half = (radius * radius - off_y * off_y).max(0.0).sqrt() * per_mm;
             let from = (place[0] - half).max(0.0) as usize;
             let to = ((place[0] + half).max(0.0) as usize + 1).min(bone.len());
-            for x in from..to {
+            let reached = nearest.iter_mut().enumerate().take(to).skip(from);
+            for (x, nearest) in reached {
                 let off_x = (x as f32 + 0.5 - place[0]) / per_mm;
                 let squared = radius * radius - off_x * off_x - off_y * off_y;
                 if squared > 0.0 {
                     let high = squared.sqrt();
                     let depth = middle - high;
-                    if nearest[x].is_none_or(|(known, ..)| depth < known) {
-                        nearest[x] = Some((
+                    if nearest.is_none_or(|(known, ..)| depth < known) {
+                        *nearest = Some((
                             depth,
                             [off_x / radius, -off_y / radius, high / radius],
                             *colour,

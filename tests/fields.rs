@@ -208,7 +208,14 @@ fn fields_are_written_on_the_scans_grid() {
             .is_file()
     );
     assert!(!dir.path().join("out/field-von-mises-mpa.nii.gz").exists());
-    assert!(dir.path().join("out/field-sed-mpa.png").is_file());
+    for picture in [
+        "field-sed-mpa.png",
+        "field-sed-mpa-3d.png",
+        "view-sed-mpa.html",
+        "field-displacement-z-mm-3d.png",
+    ] {
+        assert!(dir.path().join("out").join(picture).is_file(), "{picture}");
+    }
     let vti = std::fs::read(dir.path().join("out/fields.vti")).unwrap();
     assert!(String::from_utf8_lossy(&vti).contains("Origin=\"2.99 -2.01 0.99\""));
     assert!(said.contains("failure load 0.067 N"), "{said}");

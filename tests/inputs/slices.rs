@@ -149,8 +149,8 @@ fn results_do_not_lie_among_slices() {
     );
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("the scan's own slices"), "{said}");
-    // An older program did it: its picture is no slice.
-    for name in ["segment.json", "segment.png"] {
+    // An older program did it: its pictures are no slices.
+    for name in ["segment.json", "segment.png", "bone.png", "sites.png"] {
         std::fs::write(slices.join(name), "x").unwrap();
     }
     assert_eq!(scan::stored(&slices).unwrap().n, [4, 3, 3]);

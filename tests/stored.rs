@@ -1,4 +1,4 @@
-//! Every way of storing a voxel that the README's table of formats names, value by value.
+//! Every way of storing a voxel that the table of formats in docs/formats.md names, value by value.
 
 use crate::formats::{bytes_of, volume};
 use bonepd_ct::image::scan;

@@ -100,7 +100,7 @@ struct Said {
     /// Of each row.
     details: Vec<Details>,
     /// Which row answers.
-    answers: Option<i64>,
+    answers: Option<usize>,
     answer: Option<Answer>,
     segment: SegmentRecord,
     /// Whether the error target is met; true where there is none.

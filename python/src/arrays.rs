@@ -5,7 +5,7 @@ use bonepd_ct::format::orient;
 use bonepd_ct::pipeline::apparent::fields::{FieldVolume, MeshArray, MeshFields, SiteFields};
 use bonepd_ct::volume::Volume;
 use numpy::ndarray::Array2;
-use numpy::{Element, IntoPyArray, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{Element, IntoPyArray, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

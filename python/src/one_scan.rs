@@ -100,14 +100,17 @@ struct Said {
     /// Of each row.
     details: Vec<Details>,
     /// Which row answers.
-    answers: Option<i64>,
+    answers: Option<usize>,
     answer: Option<Answer>,
     segment: SegmentRecord,
     /// Whether the error target is met; true where there is none.
     met: bool,
 }
 
-/// Segments and solves an array. Returns the mask, fields with the number of their row, and all else as JSON.
+/// The mask, fields with the number of their row, and all else as JSON.
+type Returned<'py> = (Bound<'py, PyAny>, Vec<(usize, Bound<'py, PyDict>)>, String);
+
+/// Segments and solves an array.
 ///
 /// # Errors
 /// Settings that do not fit, in the program's words.
@@ -120,7 +123,7 @@ pub fn solve<'py>(
     settings: &str,
     threads: Option<i64>,
     progress: bool,
-) -> PyResult<(Bound<'py, PyAny>, Vec<(usize, Bound<'py, PyDict>)>, String)> {
+) -> PyResult<Returned<'py>> {
     let scan = Scan::taken(&values, voi.as_ref(), name)?;
     let recipe = laid_over(&Recipe::default(), settings).map_err(|e| raised(py, &e))?;
     let session = Session::of_caller(progress);

@@ -92,7 +92,6 @@ fn a_bad_scan_is_named_and_the_others_finish() {
         "s1/log.txt",
         "s2/segment.png",
         "s2/bone.png",
-        "s2/sites.png",
         "report/view-s1.html",
     ] {
         assert!(out.join(file).is_file(), "{file}");

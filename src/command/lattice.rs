@@ -1,6 +1,6 @@
 //! Owns `lattice` on disk: builds the lattices of a segmented scan, reports their counts, exports them.
 
-pub(super) mod picture;
+mod picture;
 
 use crate::command::estimate::refuse_lattice_that_does_not_fit;
 use crate::discretisation::lattice::connected::ConnectedSites;

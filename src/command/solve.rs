@@ -5,14 +5,13 @@ mod kept_steps;
 #[doc(hidden)]
 pub use crate::command::fields::Fields;
 use crate::command::in_words::{in_words, sections_in_words};
-use crate::command::lattice::{binned, picture};
+use crate::command::lattice::binned;
 use crate::command::{estimate, stiffness};
 use crate::error::Result;
 use crate::export::inp;
 use crate::export::tetrahedra::{self, Kind};
 use crate::format::orient::Turn;
 use crate::io::atomic;
-use crate::io::own_files::SITES;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
 use crate::measure::morphometry::Morphometry;
@@ -264,12 +263,6 @@ impl OpenScan {
                 }
             }
             rows.push(row);
-        }
-        let pictured =
-            |dir: &&PathBuf| of_lattices && !session.dry_run && !dir.join(SITES).exists();
-        if let Some(dir) = self.dir.as_ref().filter(pictured) {
-            let held = (params.axis, params.grip_mm);
-            picture::build_and_write(dir, &self.specimen, lattices, held)?;
         }
         let known = self.results.solved();
         let all = with_derived(&rows, &known);

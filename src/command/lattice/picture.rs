@@ -4,28 +4,10 @@ use crate::discretisation::lattice::sites::Sites;
 use crate::draw::map;
 use crate::draw::still::sites::{Kind, ShownLattice, SiteColour, lattices};
 use crate::error::Result;
-use crate::grid::Axis;
 use crate::io::own_files::SITES;
-use crate::pipeline::lattice::{Boundary, Case, LatticeParams, build};
+use crate::pipeline::lattice::{Boundary, Case};
 use crate::volume::Specimen;
 use std::path::Path;
-
-/// Builds them and draws them. Solves keep no sites, and the coarsest lattices are built in little time.
-///
-/// # Errors
-/// A lattice that does not fit the specimen, an unwritable folder.
-pub(in crate::command) fn build_and_write(
-    dir: &Path,
-    specimen: &Specimen,
-    params: &LatticeParams,
-    (load, grip_mm): (Axis, f64),
-) -> Result<()> {
-    let drawn: Result<Vec<ShownLattice>> = coarsest(&params.cases())
-        .iter()
-        .map(|case| Ok(shown(case, &build(specimen, case, load, grip_mm)?)))
-        .collect();
-    write(dir, specimen, &drawn?)
-}
 
 /// Draws them, where there are such lattices.
 ///
@@ -95,7 +77,7 @@ fn places(sites: &Sites, is_shown: impl Fn(usize) -> bool) -> Vec<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::lattice::{BoundaryWord, Structure};
+    use crate::pipeline::lattice::{BoundaryWord, LatticeParams, Structure};
 
     #[test]
     fn the_coarsest_firm_and_floppy_lattices_are_drawn_firm_first() {

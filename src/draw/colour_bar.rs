@@ -62,7 +62,7 @@ fn ticks(range: Range) -> Vec<f64> {
         .collect()
 }
 
-/// From 0 to what [`SHOWN`] of the elements do not exceed, below 0 where nearly all values lie there; to both sides of 0 where
+/// From 0 to what 98 % of the elements do not exceed, below 0 where nearly all values lie there; to both sides of 0 where
 /// values are of either sign. None where all values are 0, which stands for no element.
 pub fn range(values: &Volume<f32>) -> Option<Range> {
     let step = (values.grid.len() / 400_000).max(1);

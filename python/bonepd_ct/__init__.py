@@ -95,7 +95,7 @@ def solve(
     * ``segment``: the numbers of ``segment.json``
     * ``mask``: an array of bool, indexed as ``array``
     * ``fields``: what ``fields=[...]`` asks for, by name with the unit (``sed_mpa``); of voxels arrays indexed as ``array`` with
-      components last (``displacement_mm``, at the corners of voxels, is one longer along each axis)
+      components last; displacements are ``displacement_x_mm``, ``_y_``, ``_z_``; ``nodal_force_n``, at corners, is one longer along each axis
     * ``details``: forces at both ends, and tables of failure, sections, tissue and the curve, where asked for
     * ``warnings``: what is also raised as :class:`BonepdWarning`
 

@@ -33,7 +33,7 @@ pub fn laid_over(recipe: &Recipe, json: &str) -> Result<Recipe> {
     let resolution = RESOLUTION.into_iter().find(|key| given.contains_key(*key));
     let mut recipe = recipe.clone();
     make_way(&mut recipe.segment, &given);
-    let recipe = recipe.with(given, Path::new(WHOSE))?;
+    let recipe = recipe.with(given, Path::new(WHOSE)).map_err(of_call)?;
     match resolution.filter(|_| recipe.error.is_some()) {
         None => Ok(recipe),
         Some(key) => Err(Error::setting(
@@ -41,6 +41,14 @@ pub fn laid_over(recipe: &Recipe, json: &str) -> Result<Recipe> {
             "the error target chooses method and element size",
             format!("leave {key} out, or the error target"),
         )),
+    }
+}
+
+/// A recipe's error names its file. Here there is none.
+fn of_call(error: Error) -> Error {
+    match error {
+        Error::File { found, advice, .. } => Error::setting(WHOSE, found, advice),
+        other => other,
     }
 }
 

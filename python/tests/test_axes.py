@@ -35,13 +35,14 @@ def test_a_stack_of_slices_is_the_same_body(grey):
     assert one["e_app_mpa"] == stack["e_app_mpa"]
     assert one["voxel_mm"] == stack["voxel_mm"] == "0.02;0.03;0.025"
     assert np.array_equal(one["mask"], stack["mask"].T)
-    turned = stack["fields"]["displacement_mm"].transpose(2, 1, 0, 3)
-    assert np.array_equal(one["fields"]["displacement_mm"], turned)
+    for name, field in one["fields"].items():
+        assert np.array_equal(field, stack["fields"][name].T), name
     # -1 % between the ends, along z.
-    u = one["fields"]["displacement_mm"][..., 2]
+    u = one["fields"]["displacement_z_mm"]
     ends = [u[:, :, k][u[:, :, k] != 0.0] for k in (0, -1)]
     moved = np.concatenate(ends)
-    assert np.ptp(moved) <= 0.01 * 28 * 0.025 * (1 + 1e-6) and np.abs(moved).max() > 0
+    # Means over voxels: struts that end in pore turn with their voxels, by up to a percent or so.
+    assert np.ptp(moved) == pytest.approx(0.01 * 28 * 0.025, rel=0.03)
 
 
 def test_sizes_of_a_stack_that_might_be_meant_otherwise_are_said(grey):

@@ -14,6 +14,8 @@ FLOATS = MASK.astype(float)
     ("array", "settings", "words"),
     [
         (FLOATS, {}, "no threshold given"),
+        (2 * MASK.astype(np.uint8), {}, "no threshold given"),
+        (-MASK.astype(np.int8), {}, "no threshold given"),
         (FLOATS.astype(complex), {"lower": 1}, "complex128 are no voxels"),
         (np.full((4, 4, 4), "bone"), {"lower": 1}, "are no voxels"),
         (MASK[0], {}, r"has the shape \(4, 4\)"),

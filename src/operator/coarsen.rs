@@ -40,6 +40,11 @@ pub trait Coarsen: Operator<3> {
         hinges.fill(false);
     }
 
+    /// Whether all that joins sites is of one stiffness: then every coupling is a strong one.
+    fn is_uniform(&self) -> bool {
+        false
+    }
+
     /// Sites per task: products with fewer rows at a time may cost more a row.
     fn chunk(&self) -> usize {
         CHUNK
@@ -75,6 +80,10 @@ impl<O: Coarsen> Coarsen for &O {
 
     fn hinges(&self, sites: Range<usize>, hinges: &mut [bool]) {
         (**self).hinges(sites, hinges);
+    }
+
+    fn is_uniform(&self) -> bool {
+        (**self).is_uniform()
     }
 
     fn chunk(&self) -> usize {

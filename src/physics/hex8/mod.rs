@@ -118,6 +118,10 @@ impl Coarsen for Hex8 {
         pairs.for_each(|(hinge, &around)| *hinge = !share_faces(around));
     }
 
+    fn is_uniform(&self) -> bool {
+        true
+    }
+
     fn chunk(&self) -> usize {
         kernel::chunk(&self.mesh)
     }

@@ -213,6 +213,12 @@ impl Level<6> for Coarse {
         times(&self.inverse[site], r)
     }
 
+    #[inline]
+    fn inverse(&self, site: usize) -> [Six; 6] {
+        let inverse = &self.inverse[site];
+        std::array::from_fn(|r| std::array::from_fn(|c| inverse[6 * c + r]))
+    }
+
     /// The inverse drops what has no stiffness.
     #[inline]
     fn unscale(&self, _: usize, _: &Six) -> Option<Six> {

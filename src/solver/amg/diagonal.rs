@@ -109,6 +109,13 @@ impl Diagonal {
         times(self.inverse(site), r)
     }
 
+    /// `D⁻¹`.
+    #[inline]
+    pub fn inverse_block(&self, site: usize) -> [[f32; 3]; 3] {
+        let [xx, yy, zz, yz, xz, xy] = *self.inverse(site);
+        [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+    }
+
     /// `D t` on the free components, where the blocks are kept.
     #[inline]
     pub fn unscale(&self, site: usize, t: &[f32; 3]) -> Option<[f32; 3]> {

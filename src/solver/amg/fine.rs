@@ -156,10 +156,16 @@ fn each_strong(
     sites: Range<usize>,
     visit: &mut dyn FnMut(usize, &[u32]),
 ) {
+    let is_uniform = operator.is_uniform();
     let mut kept = Vec::with_capacity(27);
     operator.each_row(sites, &mut |site, columns, blocks| {
         kept.clear();
-        if !hinges[site] {
+        if hinges[site] {
+            return visit(site, &kept);
+        }
+        if is_uniform {
+            kept.extend(columns.iter().filter(|j| !hinges[**j as usize]));
+        } else {
             let own = STRONG * STRONG * diagonal.stiffness(site);
             let is_strong = |j: u32, block: &Block| {
                 let squared: f32 = block.as_flattened().iter().map(|v| v * v).sum();
@@ -273,6 +279,11 @@ impl<O: Coarsen> Level<3> for Fine<'_, O> {
     #[inline]
     fn scale(&self, site: usize, r: &[f32; 3]) -> [f32; 3] {
         self.diagonal.scale(site, r)
+    }
+
+    #[inline]
+    fn inverse(&self, site: usize) -> [[f32; 3]; 3] {
+        self.diagonal.inverse_block(site)
     }
 
     #[inline]

@@ -5,16 +5,12 @@
 
 use super::blocks::{self, Block6, BlockMatrix};
 use super::fine::Body;
-use super::level::{Level, Modes};
+use super::image::{Gather, Image, Wide6};
+use super::level::Level;
 use super::rigid::{self, Mat6};
-use super::window::{BLOCK, Entry, Prolongator, Rows, add_product, find};
-use crate::simd;
-use crate::simd::{Isa, Lanes};
+use super::window::{BLOCK, Prolongator};
 use rayon::prelude::*;
 use std::ops::Range;
-
-/// A coarse block in the making, row by row of eight lanes.
-type Wide = [[f32; 8]; 6];
 
 /// Blocks of a part of the coarse matrix, upper triangle (column >= row).
 struct Part {
@@ -51,30 +47,6 @@ fn in_basis(block: &Block6, row: &Body, column: &Body) -> Block6 {
 }
 
 fn part<const D: usize>(level: &impl Level<D>, omega: f32, sites: Range<usize>) -> Part {
-    match simd::isa() {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: the processor has what the function asks for.
-        Isa::Avx512 | Isa::Avx2 => unsafe { part_avx2(level, omega, sites) },
-        // SAFETY: plain arrays ask for nothing.
-        _ => unsafe { part_lanes::<simd::PlainF32, D>(level, omega, sites) },
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn part_avx2<const D: usize>(level: &impl Level<D>, omega: f32, sites: Range<usize>) -> Part {
-    // SAFETY: this function has the features that the lanes ask for.
-    unsafe { part_lanes::<simd::Avx2F32, D>(level, omega, sites) }
-}
-
-/// # Safety
-/// The instruction set of `N` is there.
-#[inline(always)]
-unsafe fn part_lanes<N: Lanes<S = f32>, const D: usize>(
-    level: &impl Level<D>,
-    omega: f32,
-    sites: Range<usize>,
-) -> Part {
     let spans = sites.clone().step_by(BLOCK);
     let spans: Vec<Range<usize>> = spans.map(|s| s..(s + BLOCK).min(sites.end)).collect();
     // What a span of sites reaches, with everything that later ones reach: the sweep never turns back.
@@ -82,37 +54,28 @@ unsafe fn part_lanes<N: Lanes<S = f32>, const D: usize>(
     for i in (1..reaches.len()).rev() {
         reaches[i - 1].start = reaches[i - 1].start.min(reaches[i].start);
     }
+    let gather = Gather::here();
     let mut prolongator = Prolongator::new(level, omega);
+    let mut image = Image::new(level.aggregates().count);
     let mut sum = Sum::new(level.aggregates().count);
-    let (mut rows, mut image) = (Rows::new(), Vec::<Entry<D>>::new());
     for (span, reach) in spans.into_iter().zip(reaches) {
-        // SAFETY: the caller's.
-        unsafe { prolongator.cover::<N>(reach) };
-        rows.read(level, span.clone());
-        for (k, i) in span.enumerate() {
-            let own = prolongator.row(i);
-            if own.is_empty() {
-                continue;
-            }
-            image.clear();
+        prolongator.cover(reach);
+        let rows = prolongator.rows();
+        level.each_row(span, &mut |site, columns, blocks| {
+            let (aggregates, entries) = rows.row(site);
             // Blocks left of the diagonal are not kept.
-            let least = own.iter().map(|e| e.aggregate).fold(u32::MAX, u32::min);
-            for (j, block) in rows.row(k) {
-                let entries = prolongator.row(j as usize).iter();
-                for entry in entries.filter(|e| e.aggregate >= least) {
-                    let slot = find(&mut image, 0, entry.aggregate);
-                    // SAFETY: the caller's.
-                    unsafe { add_product::<N, D>(&mut slot.block, &block, &entry.block) };
+            let Some(&least) = aggregates.iter().min() else {
+                return;
+            };
+            gather.image(&mut image, columns, blocks, rows, least);
+            for (&left, a) in aggregates.iter().zip(entries) {
+                for (&right, b) in image.aggregates().iter().zip(image.blocks()) {
+                    if right >= left {
+                        gather.add_transposed(sum.slot(left, right), a, b);
+                    }
                 }
             }
-            for left in own {
-                for right in image.iter().filter(|r| r.aggregate >= left.aggregate) {
-                    let slot = sum.slot(left.aggregate, right.aggregate);
-                    // SAFETY: the caller's.
-                    unsafe { add_transposed::<N, D>(slot, &left.block, &right.block) };
-                }
-            }
-        }
+        });
     }
     Part {
         places: sum.places,
@@ -121,37 +84,14 @@ unsafe fn part_lanes<N: Lanes<S = f32>, const D: usize>(
 }
 
 /// Column by column, the two idle lanes left out.
-fn packed(wide: &Wide) -> Block6 {
-    std::array::from_fn(|i| wide[i % 6][i / 6])
-}
-
-/// `sum += aᵀ b`.
-///
-/// # Safety
-/// The instruction set of `N` is there.
-#[inline(always)]
-unsafe fn add_transposed<N: Lanes<S = f32>, const D: usize>(
-    sum: &mut Wide,
-    a: &Modes<D>,
-    b: &Modes<D>,
-) {
-    // SAFETY: the caller vouches for the instruction set; rows of `Wide` and of `Modes` are arrays of eight scalars.
-    unsafe {
-        let b: [N; D] = std::array::from_fn(|k| N::load(b[k].as_ptr()));
-        for r in 0..6 {
-            let mut lanes = N::load(sum[r].as_ptr());
-            for k in 0..D {
-                lanes = lanes.fma(N::splat(a[k][r]), b[k]);
-            }
-            lanes.store(sum[r].as_mut_ptr());
-        }
-    }
+fn packed(wide: &Wide6) -> Block6 {
+    std::array::from_fn(|i| wide.0[i % 6][i / 6])
 }
 
 /// Coarse blocks of one part. Rows are few and short, so a block is found by its row's list.
 struct Sum {
     places: Vec<(u32, u32)>,
-    blocks: Vec<Wide>,
+    blocks: Vec<Wide6>,
     /// Per aggregate, one more than the number of its list; 0 where it has none yet.
     list: Vec<u32>,
     /// Columns of a row and where their blocks are.
@@ -169,7 +109,7 @@ impl Sum {
     }
 
     #[inline(always)]
-    fn slot(&mut self, row: u32, column: u32) -> &mut Wide {
+    fn slot(&mut self, row: u32, column: u32) -> &mut Wide6 {
         let list = &mut self.list[row as usize];
         if *list == 0 {
             self.lists.push(Vec::with_capacity(16));
@@ -181,7 +121,7 @@ impl Sum {
             None => {
                 list.push((column, self.blocks.len() as u32));
                 self.places.push((row, column));
-                self.blocks.push([[0.0; 8]; 6]);
+                self.blocks.push(Wide6([[0.0; 8]; 6]));
                 self.blocks.len() - 1
             }
         };

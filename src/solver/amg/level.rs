@@ -37,6 +37,8 @@ pub trait Level<const D: usize>: Sync {
     fn reach(&self, sites: Range<usize>) -> Range<usize>;
     /// `D⁻¹ r` at a site, zero in held components.
     fn scale(&self, site: usize, r: &[f32; D]) -> [f32; D];
+    /// `D⁻¹` at a site, zero rows and columns for held components.
+    fn inverse(&self, site: usize) -> [[f32; D]; D];
     /// `D t` at a site on its free components, where [`Level::scale`] has an exact inverse.
     fn unscale(&self, site: usize, t: &[f32; D]) -> Option<[f32; D]>;
     /// The mean of the diagonal of `D` at a site.

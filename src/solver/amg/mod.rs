@@ -19,6 +19,7 @@ mod eigenvalue;
 mod fine;
 mod galerkin;
 mod grouping;
+mod image;
 mod level;
 mod rigid;
 mod window;

@@ -25,8 +25,7 @@ const SMOOTHED: f64 = 0.8;
 /// their place. None without a surface.
 pub fn sensitivity(solved: &Solved, specimen: &Specimen, grips: Planes, mean: f64) -> Option<f64> {
     let mut shell = Shell::of(solved.mesh, grips);
-    let (grid, filled) = (shell.grid, &shell.filled);
-    shell.pores.retain(|e| !joins(grid, filled, *e));
+    let grid = shell.grid;
     let grey = specimen.grey.as_ref().zip(specimen.threshold.as_ref());
     match grey.filter(|(grey, _)| grey.grid.n == grid.n) {
         Some((grey, threshold)) => {
@@ -97,18 +96,37 @@ impl Shell {
     fn keep_nearest(&mut self, values: &[f32]) {
         let moved = ((MOVED * self.elements as f64) as usize).max(1);
         let rising = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]).then(a.cmp(b));
-        keep_first(&mut self.bone, moved, rising);
-        keep_first(&mut self.pores, moved, |a, b| rising(b, a));
+        let (grid, filled) = (self.grid, &self.filled);
+        keep_first(&mut self.bone, moved, rising, |_| true);
+        keep_first(
+            &mut self.pores,
+            moved,
+            |a, b| rising(b, a),
+            |e| !joins(grid, filled, e),
+        );
     }
 }
 
-/// Leaves the first `n` of the voxels, in their order. No two are equal in it.
-fn keep_first(voxels: &mut Vec<usize>, n: usize, order: impl Fn(&usize, &usize) -> Ordering) {
-    if n < voxels.len() {
-        voxels.select_nth_unstable_by(n, &order);
-        voxels.truncate(n);
+/// Leaves the first `n` of the voxels that may be kept, in their order. No two are equal in it. Few are asked for whether they may:
+/// that takes longer than finding the first ones.
+fn keep_first(
+    voxels: &mut Vec<usize>,
+    n: usize,
+    order: impl Fn(&usize, &usize) -> Ordering,
+    may_keep: impl Fn(usize) -> bool,
+) {
+    let (mut kept, mut rest) = (Vec::new(), &mut voxels[..]);
+    while kept.len() < n && !rest.is_empty() {
+        let count = (n - kept.len()).min(rest.len());
+        if count < rest.len() {
+            rest.select_nth_unstable_by(count, &order);
+        }
+        let (first, others) = rest.split_at_mut(count);
+        first.sort_unstable_by(&order);
+        kept.extend(first.iter().copied().filter(|e| may_keep(*e)));
+        rest = others;
     }
-    voxels.sort_unstable_by(order);
+    *voxels = kept;
 }
 
 fn at(grid: Grid, e: usize) -> [usize; 3] {
@@ -168,7 +186,7 @@ mod tests {
         for n in [1, 2, 50, 199, 200, 201] {
             let mut sorted: Vec<usize> = (0..200).rev().collect();
             let mut kept = sorted.clone();
-            keep_first(&mut kept, n, rising);
+            keep_first(&mut kept, n, rising, |_| true);
             sorted.sort_unstable_by(rising);
             sorted.truncate(n);
             assert_eq!(kept, sorted, "{n}");

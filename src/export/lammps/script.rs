@@ -26,7 +26,10 @@ pub struct Specimen {
 /// # Errors
 /// An unwritable file.
 pub fn write(script: &Path, data: &Path, sites: &Sites, specimen: Specimen) -> Result<()> {
-    let name = |path: &Path| path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let name = |path: &Path| {
+        path.file_name()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+    };
     let lp = sites.frame.lp_mm;
     let values = [
         ("@DATA@", name(data)),
@@ -39,6 +42,10 @@ pub fn write(script: &Path, data: &Path, sites: &Sites, specimen: Specimen) -> R
         ("@YOUNG@", specimen.young_mpa.to_string()),
         ("@LP@", lp.to_string()),
     ];
-    let text = values.iter().fold(STEPS.to_owned(), |text, (place, value)| text.replace(place, value));
+    let text = values
+        .iter()
+        .fold(STEPS.to_owned(), |text, (place, value)| {
+            text.replace(place, value)
+        });
     atomic::write(script, text)
 }

@@ -3,8 +3,8 @@
 use super::equilibrium::{Factorised, factorise, right_hand_side, solve};
 use super::path::isolated;
 use super::setup::{Conductor, Setup};
-use super::steady::difference::difference;
-use super::steady::{DIFFERENCE, LARGEST_DIFFERENCE, RELATIVE_DIFFERENCE, loads, scalar, summary};
+use super::steady::difference::{DIFFERENCE, Difference, at_points, difference};
+use super::steady::{loads, scalar, summary};
 use super::{KnownField, Molecular, Steady, Transient};
 use crate::error::{Error, Result};
 use crate::operator::Operator;
@@ -76,11 +76,9 @@ fn conducted(
     let mut fields = fluxes(&values, &flux);
     if let Some(known) = setup.known_field::<1>(model, None) {
         let is_held = |p: usize| held[p].is_some();
-        if let Some(difference) = difference(x, &known, is_held, 1) {
-            numbers.push((LARGEST_DIFFERENCE.into(), difference.largest));
-            numbers.push((RELATIVE_DIFFERENCE.into(), difference.relative));
-            fields.push(scalar(DIFFERENCE, difference.at));
-        }
+        let of_temperature = difference(x, &known, is_held, 1);
+        numbers.extend(of_temperature.iter().flat_map(Difference::numbers));
+        fields.push(scalar(DIFFERENCE, at_points(of_temperature, x.len())));
         let exact = known_flux(model, steady, setup)?;
         if let Some(difference) = difference(&flux, &exact, is_held, 2) {
             numbers.push(("relative_difference_of_flux".into(), difference.relative));

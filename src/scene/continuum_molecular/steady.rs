@@ -10,13 +10,8 @@ use super::solid::Solid;
 use crate::error::Result;
 use crate::scene::frame::{Field, Frame, Observer, Summary, Values};
 use crate::scene::setting::Setting;
-use difference::difference;
+use difference::{DIFFERENCE, Difference, at_points, difference};
 use section::sections;
-
-/// Names of what says how far a solution is from the field that holds its rim.
-pub const LARGEST_DIFFERENCE: &str = "largest_difference_from_known_field";
-pub const RELATIVE_DIFFERENCE: &str = "relative_difference_from_known_field";
-pub const DIFFERENCE: &str = "difference_from_known";
 
 /// Forces of thermal strain: each bond pushes with its stiffness times the stretch (and shear) that it would have if
 /// free (eq. 176).
@@ -114,11 +109,9 @@ pub fn deform<const D: usize>(
     let mut fields = vec![displacement(&x, 1.0)];
     if let Some(known) = setup.known_field::<D>(model, Some(&solid.tensor)) {
         let held = |p: usize| (0..D).all(|d| solid.held[p * D + d].is_some());
-        if let Some(difference) = difference(&x, &known, held, 2) {
-            numbers.push((LARGEST_DIFFERENCE.into(), difference.largest));
-            numbers.push((RELATIVE_DIFFERENCE.into(), difference.relative));
-            fields.push(scalar(DIFFERENCE, difference.at));
-        }
+        let difference = difference(&x, &known, held, 2);
+        numbers.extend(difference.iter().flat_map(Difference::numbers));
+        fields.push(scalar(DIFFERENCE, at_points(difference, x.len())));
     }
     if D == 3 {
         fields.push(scalar("rotation", x.iter().map(|u| u[2]).collect()));

@@ -1,5 +1,8 @@
 //! Owns how far a solution is from the field that holds its rim.
 
+/// The field of differences, as scenes name it.
+pub const DIFFERENCE: &str = "difference_from_known";
+
 /// Differences of a solution from a known field over the free points.
 pub struct Difference {
     /// Size of the difference at each point; 0 where the point is held.
@@ -8,6 +11,21 @@ pub struct Difference {
     pub largest: f64,
     /// Root mean square of the differences over that of the field.
     pub relative: f64,
+}
+
+impl Difference {
+    /// As columns of `history.csv`.
+    pub fn numbers(&self) -> [(String, f64); 2] {
+        [
+            ("largest_difference_from_known_field".into(), self.largest),
+            ("relative_difference_from_known_field".into(), self.relative),
+        ]
+    }
+}
+
+/// The difference at each of `points`; 0 where all are held.
+pub fn at_points(difference: Option<Difference>, points: usize) -> Vec<f64> {
+    difference.map_or_else(|| vec![0.0; points], |d| d.at)
 }
 
 /// `found` and `known` by point, compared by their first `components`; a point all of whose values are `held` does not count. None

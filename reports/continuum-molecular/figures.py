@@ -258,7 +258,7 @@ def crack_tip_lines():
 
 
 maps("heat-disc", ["heat-disc/temperature_t1.png", "heat-disc/flux_size_t1.png"])
-maps("differences", ["crack-tip-I/difference_from_known_t1.png", "crack-tip-II/difference_from_known_t1.png"])
+maps("differences", ["crack-tip-I/difference_from_known_t1.png"])
 directions()
 crack_tip_lines()
 maps("crack-tip", ["crack-tip-I/stress_yy_t1.png"])

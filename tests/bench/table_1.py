@@ -54,7 +54,9 @@ def keep(rows):
 
 def solved(binary, folder, method, size, *words):
     seconds = run(binary, "solve", folder, *words, *LOAD)
-    row = [r for r in read(folder / "results.csv") if r["boundary"] != "ffb"][-1]
+    lattice = method in ("floppy", "firm")
+    found = [r for r in read(folder / "results.csv") if r["boundary"] == (method if lattice else "NA")]
+    (row,) = [r for r in found if not lattice or float(r["lp_mm"]) == size]
     return {
         "method": method, "size_mm": size, "unknowns": row["unknowns"], "iterations": row["iterations"],
         "e_app_mpa": f"{float(row['e_app_mpa']):.5g}", "error_mpa": row["error_mpa"], "cpu_s": f"{seconds:.1f}",

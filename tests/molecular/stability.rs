@@ -69,61 +69,49 @@ fn cases() -> Vec<(String, String, End)> {
     use End::{Either, Refused, Within};
     let mut all = Vec::new();
     let mut add = |what: String, text: String, end| all.push((what, text, end));
-    for (poisson, plane, within) in [
-        (-0.99, "stress", 1e-11),
-        (0.0, "stress", 1e-12),
-        (1.0 / 3.0, "stress", 1e-12),
-        (0.49, "stress", 1e-12),
-        (0.9, "stress", 1e-11),
-        (0.25, "strain", 1e-12),
-        (0.45, "strain", 1e-11),
+    // Bounds: rounding, 1e-16, times the condition of the matrix, some 1e3 for these sizes and more where C66 or C11 goes to infinity.
+    for (poisson, plane) in [
+        (-0.99, "stress"),
+        (0.0, "stress"),
+        (1.0 / 3.0, "stress"),
+        (0.49, "stress"),
+        (0.9, "stress"),
+        (0.25, "strain"),
+        (0.45, "strain"),
+        (0.499, "strain"),
     ] {
         let more = format!("young = 1, poisson = {poisson}, plane = '{plane}'");
-        let what = format!("nu {poisson:.3}, plane {plane}, m = 3");
-        add(what, elastic(3.0, &more), Within(within));
-    }
-    let more = "young = 1, poisson = 0.499, plane = 'strain'";
-    add(
-        "nu 0.499, plane strain, m = 3".into(),
-        elastic(3.0, more),
-        Within(1e-9),
-    );
-    for ratio in [1.0, 2.0, 8.0] {
-        let end = if ratio < 2.0 {
-            Refused("too few directions")
-        } else {
-            Within(1e-12)
+        let limit = if plane == "stress" { 1.0 / 3.0 } else { 0.25 };
+        // Calibrated, k_t is negative in some directions at the limit already.
+        let end = match poisson < limit - 0.01 {
+            true => Within(1e-11),
+            false => Either(1e-9, "positive definite"),
         };
-        add(
-            format!("horizon of {ratio} points"),
-            elastic(ratio, "young = 1, poisson = 0.2"),
-            end,
-        );
+        let what = format!("nu {poisson:.3}, plane {plane}, m = 3");
+        add(what, elastic(3.0, &more), end);
+    }
+    let isotropic = "young = 1, poisson = 0.2";
+    for (ratio, end) in [
+        (1.0, Either(1e-11, "directions")),
+        (2.0, Within(1e-11)),
+        (8.0, Within(1e-11)),
+    ] {
+        let what = format!("horizon of {ratio} points");
+        add(what, elastic(ratio, isotropic), end);
     }
     for stiff in [1e2, 1e4] {
         let more = format!("moduli = [{stiff}, 1, 0.2, 0.4, 0, 0]");
-        add(
-            format!("moduli {stiff:e} : 1, m = 5"),
-            elastic(5.0, &more),
-            Within(1e-9),
-        );
+        let what = format!("moduli {stiff:e} : 1, m = 5");
+        add(what, elastic(5.0, &more), Either(1e-9, "positive definite"));
         let more = format!("conductivity = [{stiff}, 1, 0], exponent = 2");
-        add(
-            format!("conductivity {stiff:e} : 1, n = 2"),
-            heat(3.0, &more),
-            Within(1e-9),
-        );
+        let what = format!("conductivity {stiff:e} : 1, n = 2");
+        add(what, heat(3.0, &more), Either(1e-9, "positive definite"));
     }
-    add(
-        "one row of points, nu 0.2".into(),
-        row(0.2),
-        Within(f64::INFINITY),
-    );
-    add(
-        "one row of points, central bonds".into(),
-        row(1.0 / 3.0),
-        Refused("positive definite"),
-    );
+    // Points in a row may turn against each other and move sideways at no cost.
+    for poisson in [0.2, 1.0 / 3.0] {
+        let what = format!("one row of points, nu {poisson:.3}");
+        add(what, row(poisson), Refused("positive definite"));
+    }
     all
 }
 

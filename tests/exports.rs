@@ -269,7 +269,7 @@ fn lammps_data_are_told_to_be_of_a_quarter() {
         "{words}"
     );
     assert!(!said("vtk").contains("0.25"));
-    // Beside the data, the steps for the whole bar of 0.4 mm: nothing is left to fill in.
+    // Next to the data, the steps for the whole bar of 0.4 mm: nothing is left to fill in.
     let script =
         std::fs::read_to_string(std::path::Path::new(out).join("lattice-sc-floppy-0.1.in"))
             .unwrap();

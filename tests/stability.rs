@@ -56,7 +56,9 @@ fn phantom() -> Specimen {
     let mask = structure(&params).unwrap().mask;
     let [nx, ny, nz] = mask.grid.n;
     let bone = mask.as_slice();
-    specimen([nx, ny, nz], [0.06; 3], |[x, y, z]| bone[(z * ny + y) * nx + x] == 1)
+    specimen([nx, ny, nz], [0.06; 3], |[x, y, z]| {
+        bone[(z * ny + y) * nx + x] == 1
+    })
 }
 
 /// Multigrid took 1541 iterations on a core of such bone; a factor of the springs takes a few. The modulus is that of a solve to 1e-10.
@@ -70,10 +72,16 @@ fn thin_floppy_lattices_take_few_iterations() {
     let loose = solve(&case, &case.params).unwrap();
     let exact = solve(&case, &tight).unwrap();
     let [loose_mpa, exact_mpa] = [&loose, &exact].map(|s| s.moduli.e_app_mpa);
-    println!("{} sites, {} iterations, {loose_mpa} MPa, exact {exact_mpa}", loose.sites, loose.iterations);
+    println!(
+        "{} sites, {} iterations, {loose_mpa} MPa, exact {exact_mpa}",
+        loose.sites, loose.iterations
+    );
     assert!(loose.sites >= 4096, "{}", loose.sites);
     assert!(loose.iterations <= 30, "{}", loose.iterations);
-    assert!((loose_mpa / exact_mpa - 1.0).abs() < 1e-3, "{loose_mpa} {exact_mpa}");
+    assert!(
+        (loose_mpa / exact_mpa - 1.0).abs() < 1e-3,
+        "{loose_mpa} {exact_mpa}"
+    );
 }
 
 enum Model {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Lattices against LAMMPS (Debian package `lammps`): at ν = ¼ and small strain the exported lattice, minimised by
-LAMMPS with the script that is exported beside it, must store the same elastic energy to 0.1 %.
+LAMMPS with the script that is exported next to it, must store the same elastic energy to 0.1 %.
 
 usage: tests/peers/lammps.py [SCAN [SEGMENT FLAGS ...]]      (default: sample_data/trabecular.nii.gz)
 Needs nothing but Python and `lmp` on the PATH; skips, with its reason, where LAMMPS is absent.

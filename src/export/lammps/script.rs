@@ -1,4 +1,4 @@
-//! Owns the LAMMPS input script beside the data: the published steps of compression.
+//! Owns the LAMMPS input script next to the data: the published steps of compression.
 
 use crate::discretisation::lattice::sites::Sites;
 use crate::error::Result;
@@ -8,7 +8,7 @@ use std::path::Path;
 /// The steps, with places for what differs from lattice to lattice.
 const STEPS: &str = include_str!("steps.lammps");
 
-/// What the script needs besides the lattice.
+/// What the script needs in addition to the lattice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Specimen {
     /// Along z, pores included.

@@ -269,4 +269,19 @@ fn lammps_data_are_told_to_be_of_a_quarter() {
         "{words}"
     );
     assert!(!said("vtk").contains("0.25"));
+    // Next to the data, the steps for the whole bar of 0.4 mm: nothing is left to fill in.
+    let script =
+        std::fs::read_to_string(std::path::Path::new(out).join("lattice-sc-floppy-0.1.in"))
+            .unwrap();
+    assert!(!script.contains('@'), "{script}");
+    for line in [
+        "read_data lattice-sc-floppy-0.1.data",
+        "variable area equal 0.16",
+    ] {
+        assert!(script.contains(line), "{line}: {script}");
+    }
+    assert!(
+        script.contains("$(0.4-v_grip_mm-") && script.contains("comm_modify cutoff 0.3"),
+        "{script}"
+    );
 }

@@ -1,8 +1,10 @@
 //! Continuum-molecular scenes against closed forms and an independent prototype.
 
+mod bond_laws;
 mod breaking;
 mod costs;
 mod couple_stress;
+mod differences;
 mod fields;
 mod heat;
 mod history;
@@ -10,13 +12,14 @@ mod limits;
 mod refusals;
 mod repeated_modes;
 mod resume;
+mod stability;
 mod tetrachiral;
 mod thermal_stress;
 mod turned;
 
 use bonepd_ct::discretisation::plane::Points;
 use bonepd_ct::error::Result;
-use bonepd_ct::scene::frame::{Frame, Observer, Summary, Values};
+use bonepd_ct::scene::frame::{Directions, Frame, Observer, Summary, Values};
 use bonepd_ct::scene::setting::Inputs;
 use bonepd_ct::scene::{Scene, run};
 use std::path::Path;
@@ -28,6 +31,7 @@ pub struct Kept {
     pub frames: Vec<Frame>,
     pub words: Vec<String>,
     pub warnings: Vec<String>,
+    pub directions: Directions,
 }
 
 impl Observer for Kept {
@@ -37,6 +41,10 @@ impl Observer for Kept {
     }
     fn frame(&mut self, frame: &Frame) -> Result<()> {
         self.frames.push(frame.clone());
+        Ok(())
+    }
+    fn directions(&mut self, directions: &Directions) -> Result<()> {
+        self.directions = directions.clone();
         Ok(())
     }
     fn say(&mut self, line: &str) {

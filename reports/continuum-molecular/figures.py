@@ -198,7 +198,69 @@ def maps(name, files):
     sheet.quantize(96, Image.Quantize.FASTOCTREE).save(OUT / f"{name}.png", optimize=True)
 
 
-maps("heat-disc", ["heat-disc/temperature_t1.png"])
+def columns_of(path):
+    """Columns of a CSV file of numbers, or None."""
+    if not path.exists():
+        print(f"left out: {path} is missing")
+        return None
+    rows = list(csv.DictReader(open(path)))
+    return {key: [float(row[key]) for row in rows] for key in rows[0]}
+
+
+def directions():
+    """k_n and k_t, w_c, and the reciprocal fracture energy by direction, as Figures 2, 14 and 16 show them."""
+    tip, bone = (columns_of(RUNS / name / "directions.csv") for name in ("crack-tip-I", "compact-tension-0"))
+    if tip is None or bone is None:
+        return
+    figure, axes = plt.subplots(1, 3, figsize=(9.6, 3.4), subplot_kw={"projection": "polar"})
+    angle = [math.radians(a) for a in tip["angle_deg"]]
+    largest = max(tip["k_n"])
+    for k, name in enumerate(("k_n", "k_t")):
+        axes[0].plot(angle, [v / largest for v in tip[name]], DASHES[k], color=HUES[k], lw=1.2, label=name)
+    axes[0].legend(fontsize=7, loc="lower left")
+    axes[0].set_title("crack-tip body: k_n, k_t over the largest k_n", fontsize=8)
+    for axis, name, invert in ((axes[1], "w_c", False), (axes[2], "fracture_energy", True)):
+        values = [1 / v if invert else v for v in bone[name]]
+        axis.plot(angle, [v / max(values) for v in values], color=HUES[0], lw=1.2)
+    axes[1].set_title("cortical bone, n = 8: w_c over the largest", fontsize=8)
+    axes[2].set_title("its 1/G over the largest", fontsize=8)
+    for axis in axes:
+        axis.tick_params(labelsize=7)
+    save("directions")
+
+
+def crack_tip_lines():
+    """Figures 7 to 9: the stress ahead of the tip, and the opening of the upper face, against their closed forms."""
+    fields = columns_of(RUNS / "crack-tip-I" / "fields_t1.csv")
+    if fields is None:
+        return
+    spacing = 1 / 120
+    row = [i for i, y in enumerate(fields["y"]) if 0 < y < spacing]
+    ahead = sorted((fields["x"][i], i) for i in row if 0 < fields["x"][i] < 0.3)
+    figure, axes = plt.subplots(1, 2, figsize=(8.2, 3.3))
+    xs = [x for x, _ in ahead]
+    axes[0].plot(xs, [1 / math.sqrt(2 * math.pi * x) for x in xs], color=HUES[2], lw=1, label="closed form")
+    for k, (name, label) in enumerate((("section_yy", "through the point's own section"), ("stress_yy", "mean over all sections"))):
+        axes[0].plot(xs, [fields[name][i] for _, i in ahead], MARKS[k], color=HUES[k], ms=3, label=label)
+    axes[0].set_xlabel("ahead of the tip, x/a")
+    axes[0].set_ylabel("stress across the line, K_I = 1")
+    axes[0].set_ylim(0, 8)
+    axes[0].legend(fontsize=7)
+    behind = sorted((fields["x"][i], i) for i in row if fields["x"][i] < 0)
+    key = next(k for k in fields if k.startswith("displacement") and k.endswith("y"))
+    axes[1].plot([x for x, _ in behind], [fields[key][i] for _, i in behind], color=HUES[0], lw=1.2, label="upper face")
+    axes[1].plot([x for x, _ in behind], [fields["difference_from_known"][i] for _, i in behind], "--", color=HUES[1], lw=1.2,
+                 label="difference from the closed form")
+    axes[1].set_xlabel("behind the tip, x/a")
+    axes[1].set_ylabel("displacement of the upper face")
+    axes[1].legend(fontsize=7)
+    save("sections")
+
+
+maps("heat-disc", ["heat-disc/temperature_t1.png", "heat-disc/flux_size_t1.png"])
+maps("differences", ["crack-tip-I/difference_from_known_t1.png"])
+directions()
+crack_tip_lines()
 maps("crack-tip", ["crack-tip-I/stress_yy_t1.png"])
 maps("plate", [f"notched-plate/damage_t{t}.png" for t in ("0.4", "0.8", "1.3")])
 maps("inclusion", ["square-inclusion/damage_t0.02.png"])

@@ -22,7 +22,8 @@ pub struct LatticeArgs {
     #[command(flatten)]
     settings: LatticeSettings,
     /// Also write each lattice for another program: lammps (data file with pair bonds only, which fixes
-    /// Poisson's ratio at 0.25; the default of `solve` is 0.3), vtk (ParaView, OVITO)
+    /// Poisson's ratio at 0.25, the default of `solve` is 0.3; and an input script that compresses it in increments), vtk
+    /// (ParaView, OVITO)
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', value_parser = ["lammps", "vtk"])]
     export: Vec<String>,
     /// Maximum number of different bond stiffnesses in an exported model; more are rounded to the means of as many bins

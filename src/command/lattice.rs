@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 /// A format for other programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Export {
-    /// A LAMMPS data file: sites and bonds.
+    /// A LAMMPS data file (sites and bonds), and an input script with the published steps.
     Lammps,
     /// A VTK file: sites and bonds, for ParaView.
     Vtk,
@@ -86,6 +86,11 @@ pub fn lattice(
         tissue: lammps::Tissue {
             young_mpa,
             bins: exports.bins,
+        },
+        specimen: lammps::script::Specimen {
+            length_mm: specimen.length_mm(Axis::Z),
+            area_mm2: specimen.area_mm2(Axis::Z),
+            young_mpa,
         },
         session,
     };
@@ -166,6 +171,7 @@ struct Written<'a> {
     dir: &'a Path,
     formats: &'a [Export],
     tissue: lammps::Tissue,
+    specimen: lammps::script::Specimen,
     session: &'a Session,
 }
 
@@ -183,6 +189,9 @@ impl Written<'_> {
                     let path = self.path(case, "data");
                     let worst = lammps::write(&path, sites, self.tissue)?;
                     self.session.say(binned(&path, worst));
+                    let script = self.path(case, "in");
+                    lammps::script::write(&script, &path, sites, self.specimen)?;
+                    self.session.say(format!("wrote {}", script.display()));
                 }
             }
         }

@@ -2,7 +2,9 @@
 //!
 //! At ν = ¼ a lattice is a plain spring network: per bond `U = (k_s/4) (elongation)²`, which is LAMMPS' harmonic bond
 //! `E = K (r − r0)²` with `K = k_s/4`. Where sites differ, a bond has the mean of its ends' weights, and bonds of about one
-//! weight share a type. mm, N and N mm, `units lj`.
+//! weight share a type. mm, N and N mm, `units lj`. [`script`] has the steps that LAMMPS then makes.
+
+pub mod script;
 
 use crate::discretisation::lattice::sites::Sites;
 use crate::error::{Error, Result};

@@ -96,6 +96,20 @@ pub enum Values {
     Vector(Vec<[f64; 2]>),
 }
 
+/// Values of a scene's bonds by direction, every degree of a turn: a column a name.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Directions {
+    pub columns: Vec<(&'static str, Vec<f64>)>,
+}
+
+impl Directions {
+    /// A column of `f` by the angle in radians.
+    pub fn add(&mut self, name: &'static str, f: impl Fn(f64) -> f64) {
+        let values = (0..360).map(|degrees| f(f64::from(degrees).to_radians()));
+        self.columns.push((name, values.collect()));
+    }
+}
+
 /// Receives what happens while a scene runs.
 pub trait Observer {
     /// Before the first state. `steps` is the number of steps foreseen.
@@ -104,6 +118,10 @@ pub trait Observer {
     /// A frame that was reported before, of the same time, now with its fields.
     fn again(&mut self, frame: &Frame) -> Result<()> {
         self.frame(frame)
+    }
+    /// What bonds are by direction, once, before the first state of scenes that have such.
+    fn directions(&mut self, _directions: &Directions) -> Result<()> {
+        Ok(())
     }
     /// Something worth a line: a halved step, a refactorisation.
     fn say(&mut self, line: &str);

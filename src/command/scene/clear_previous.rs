@@ -7,12 +7,13 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Files of every scene, whatever its fields are called.
-const ALWAYS: [&str; 6] = [
+const ALWAYS: [&str; 7] = [
     "scene.json",
     "history.csv",
     "history.svg",
     "history.png",
     "difference.csv",
+    "directions.csv",
     "fields.vtk.series",
 ];
 

@@ -13,9 +13,10 @@ use crate::machine::session::Session;
 use crate::record::history;
 use crate::report::figure::{Axis, Content, Curve, Figure, Mark, Point};
 use crate::report::plot;
-use crate::scene::frame::{Field, Frame, Observer, Output, Values};
+use crate::scene::frame::{Directions, Field, Frame, Observer, Output, Values};
 use crate::scene::state::State;
 use indicatif::ProgressBar;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -241,6 +242,22 @@ impl Observer for Writer<'_> {
             self.maps.pop();
         }
         self.frame(frame)
+    }
+
+    fn directions(&mut self, directions: &Directions) -> Result<()> {
+        let columns = &directions.columns;
+        atomic::write_with(&self.out.join("directions.csv"), |out| {
+            let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
+            writeln!(out, "angle_deg,{}", names.join(","))?;
+            for k in 0..columns.first().map_or(0, |(_, values)| values.len()) {
+                write!(out, "{k}")?;
+                columns
+                    .iter()
+                    .try_for_each(|(_, v)| write!(out, ",{}", v[k]))?;
+                writeln!(out)?;
+            }
+            Ok(())
+        })
     }
 
     fn say(&mut self, line: &str) {

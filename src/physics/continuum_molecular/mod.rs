@@ -5,11 +5,13 @@
 //! Everything here is per unit thickness (h = 1 mm); loads, energies and currents of a body of thickness h are h times
 //! as large. Angles are in radians, anticlockwise from e1.
 
+pub mod attenuation;
 pub mod body;
 pub mod bond;
 pub mod conductivity;
 pub mod cosine;
 pub mod crack_tip;
+pub mod elastic_law;
 pub mod micromoduli;
 pub mod small;
 pub mod tensor;

@@ -2,40 +2,57 @@
 
 use super::cosine::{CosineLaw, even, half_cosine};
 use crate::error::{Error, Result};
+use std::f64::consts::PI;
 
-/// Half-plane integrals ∫ w cos ψ dψ of the law's cosine term for a crack normal to the first axis and to the second
-/// (45 degrees for frequency 2). G = (δ³/3) ∫ w_c cos ψ dψ over -π/2 .. π/2 (eq. 92 with the inner integrals done).
+/// Lobes a half turn at most: far more than bonds of any stencil have directions for.
+const MOST_FREQUENT: u32 = 100;
+
+/// Half-plane integrals of the law's cosine term for a crack normal to the first axis and to the second (at 90 degrees over the
+/// frequency). G = (δ³/3) ∫ w_c cos ψ dψ over -π/2 .. π/2 (eq. 92 with the inner integrals done).
 fn crossing(exponent: u32, frequency: u32) -> [f64; 2] {
     match frequency {
-        // cosⁿ⁺¹, and sinⁿ cos.
+        // cosⁿ⁺¹, and sinⁿ cos: sums of positive terms.
         1 => [half_cosine(exponent), 2.0 / f64::from(exponent + 1)],
-        // cosⁿ(2ψ) cos ψ = (1 - 2s²)ⁿ ds by J_n = (2 (-1)ⁿ + 2n J_{n-1})/(2n + 1); sinⁿ(2ψ) cos ψ by Beta functions.
         _ => {
-            let along = (1..=exponent).fold(2.0, |j, k| {
-                let sign = if k % 2 == 0 { 2.0 } else { -2.0 };
-                (sign + 2.0 * f64::from(k) * j) / f64::from(2 * k + 1)
-            });
-            [along, doubled_sine(exponent)]
+            let quarter = 0.5 * PI / f64::from(frequency);
+            [0.0, quarter].map(|turn| half_plane(exponent, frequency, turn))
         }
     }
 }
 
-/// ∫ sinⁿ(2ψ) cos ψ dψ over -π/2 .. π/2 = 2ⁿ B((n+1)/2, n/2 + 1), n even.
-fn doubled_sine(n: u32) -> f64 {
-    // B(x, y + 1) = B(x, y) y/(x + y), from B(x, 1) = 1/x, with y = n/2.
-    let x = 0.5 * f64::from(n + 1);
-    (1..=n / 2)
-        .map(|y| 4.0 * f64::from(y) / (x + f64::from(y)))
-        .product::<f64>()
-        / x
+/// ∫ cosⁿ(A(ψ + turn)) cos ψ dψ over -π/2 .. π/2, n even: the power as a sum of cosines of even multiples `m = (n - 2k) A`, each with
+/// ∫ cos(mψ) cos ψ dψ = 2 cos(mπ/2)/(1 - m²).
+fn half_plane(exponent: u32, frequency: u32, turn: f64) -> f64 {
+    let n = exponent as i32;
+    // C(n, n/2)/2ⁿ, then outwards: C(n, k-1) = C(n, k) k/(n - k + 1).
+    let mut share: f64 = (1..=n / 2)
+        .map(|i| f64::from(2 * i - 1) / f64::from(2 * i))
+        .product();
+    let mut sum = 0.0;
+    for k in (0..=n / 2).rev() {
+        let m = (n - 2 * k) * frequency as i32;
+        let both = if m == 0 { 1.0 } else { 2.0 };
+        let sign = if m % 4 == 0 { 1.0 } else { -1.0 };
+        let m = f64::from(m);
+        sum += both * share * (m * turn).cos() * 2.0 * sign / (1.0 - m * m);
+        share *= f64::from(k) / f64::from(n - k + 1);
+    }
+    sum
+}
+
+/// Fracture energy (N/mm) of a straight crack whose normal is at `normal` (radians), of bonds that break at `law` (eq. 92): what
+/// Figures 16 to 18 show the reciprocal of.
+pub fn fracture_energy(law: &CosineLaw, horizon_mm: f64, normal: f64) -> f64 {
+    let raised = half_plane(law.exponent, law.frequency, normal - law.zeta);
+    horizon_mm.powi(3) / 3.0 * (2.0 * law.second + (law.first - law.second) * raised)
 }
 
 /// The critical energy density of bonds in N/mm⁵ per mm of thickness, from the fracture energies (N/mm) of a crack
-/// whose plane is normal to the material's first axis (`across_first`) and to its second (`across_second`; with
-/// `frequency` 2: at 45 degrees), eqs. 93-103 for any even exponent.
+/// whose plane is normal to the material's first axis (`across_first`) and to its second (`across_second`; in general, to the
+/// direction at 90 degrees over `frequency`), eqs. 93-103 for any even exponent and any whole frequency (the paper's footnote 7).
 ///
 /// # Errors
-/// A frequency other than 1 and 2. If the ratio of the energies is beyond what the exponent can carry: some bonds would
+/// A frequency below 1 or above 100. If the ratio of the energies is beyond what the exponent can carry: some bonds would
 /// release energy by breaking.
 pub fn critical_energy(
     across_first: f64,
@@ -46,11 +63,11 @@ pub fn critical_energy(
     zeta: f64,
 ) -> Result<CosineLaw> {
     even(exponent)?;
-    if ![1, 2].contains(&frequency) {
+    if !(1..=MOST_FREQUENT).contains(&frequency) {
         return Err(Error::setting(
             "fracture.frequency",
             format!("found {frequency}"),
-            "give 1 (fracture.energy normal to the material's two axes) or 2 (normal to its first axis, and at 45 degrees)",
+            "give 1 (fracture.energy normal to the material's two axes), or a whole number to 100 (normal to its first axis, and at 90 degrees over it)",
         ));
     }
     let scale = horizon_mm.powi(3) / 3.0;
@@ -161,10 +178,48 @@ mod tests {
         assert!(error.to_string().contains("fracture.energy"), "{error}");
     }
 
-    /// The integrals are known for two frequencies only.
+    /// Against the midpoint rule, any frequency, any turn; frequency 1 against its sums of positive terms.
     #[test]
-    fn other_frequencies_are_refused() {
-        for frequency in [0, 3, 4] {
+    fn half_plane_integrals_are_those_of_a_fine_sum() {
+        let steps = 20_000;
+        let h = PI / f64::from(steps);
+        for (n, frequency, turn) in [
+            (2, 1, 0.3),
+            (4, 3, 0.0),
+            (8, 3, 0.7),
+            (16, 4, 0.2),
+            (12, 5, 1.0),
+        ] {
+            let sum: f64 = (0..steps)
+                .map(|i| (f64::from(i) + 0.5) * h - 0.5 * PI)
+                .map(|psi| (f64::from(frequency) * (psi + turn)).cos().powi(n) * psi.cos() * h)
+                .sum();
+            let found = half_plane(n as u32, frequency as u32, turn);
+            assert!((found - sum).abs() < 1e-7, "{n} {frequency}: {found} {sum}");
+        }
+        for n in [2, 8, 34, 1000] {
+            let [a, b] = crossing(n, 1);
+            let other = [0.0, 0.5 * PI].map(|turn| half_plane(n, 1, turn));
+            assert!(
+                (a - other[0]).abs() < 1e-13 && (b - other[1]).abs() < 1e-13,
+                "n = {n}"
+            );
+        }
+    }
+
+    /// Frequency 3 repeats every 60 degrees: the energies given lie at 0 and 30 degrees, and come back from the law.
+    #[test]
+    fn a_law_of_frequency_three_has_its_two_energies() {
+        let law = critical_energy(1.0, 1.02, 1.5, 8, 3, 0.2).unwrap();
+        for (turn_deg, expected) in [(0.0, 1.0), (30.0, 1.02), (60.0, 1.0), (90.0, 1.02)] {
+            let found = fracture_energy(&law, 1.5, 0.2 + f64::to_radians(turn_deg));
+            assert!((found - expected).abs() < 1e-13, "{turn_deg}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_frequency_of_none_or_of_too_many_is_refused() {
+        for frequency in [0, 101] {
             let error = critical_energy(1.0, 1.0, 1.0, 4, frequency, 0.0).unwrap_err();
             assert!(error.to_string().contains("fracture.frequency"), "{error}");
         }

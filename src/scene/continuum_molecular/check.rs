@@ -8,6 +8,7 @@ mod unused;
 use super::conduction::CONDUCTED;
 use super::setup::{Conductor, Setup};
 use super::solid::{DISPLACEMENT, Solid};
+use super::steady::difference::DIFFERENCE;
 use super::steady::loads;
 use super::sweep::Sweep;
 use super::{Conduction, Elasticity, Molecular, Problem, Steady, Transient, fracture};
@@ -166,19 +167,40 @@ fn conducting(
     Ok(conductor)
 }
 
+/// Of static scenes, rotations apart.
+const STATIC: [&str; 7] = [
+    "energy",
+    "stress_xx",
+    "stress_yy",
+    "stress_xy",
+    "section_xx",
+    "section_yy",
+    "section_xy",
+];
+
 /// Names of the scalar fields that a scene writes, the first of them drawn by default.
 fn scalars(model: &Molecular, turns: bool) -> Vec<&'static str> {
+    let mut names = always(model, turns);
+    let compares = matches!(model.problem, Problem::Static { .. } | Problem::Steady(_));
+    if compares && model.one_known().is_some() {
+        names.push(DIFFERENCE);
+    }
+    names
+}
+
+/// The same without what only a known field brings.
+fn always(model: &Molecular, turns: bool) -> Vec<&'static str> {
     match &model.problem {
-        Problem::Steady(_) | Problem::Transient(_) => vec!["temperature"],
+        Problem::Steady(_) | Problem::Transient(_) => vec!["temperature", "flux_size"],
         Problem::Fracture {
             conduction: None, ..
         } => vec!["damage"],
         Problem::Fracture { .. } => vec!["damage", "potential"],
         Problem::Vibration { .. } => vec!["magnitude"],
-        Problem::Static { .. } if turns => {
-            vec!["rotation", "energy", "stress_xx", "stress_yy", "stress_xy"]
+        Problem::Static { .. } => {
+            let rotation = turns.then_some("rotation");
+            rotation.into_iter().chain(STATIC).collect()
         }
-        Problem::Static { .. } => vec!["energy", "stress_xx", "stress_yy", "stress_xy"],
     }
 }
 

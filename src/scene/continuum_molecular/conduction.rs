@@ -3,8 +3,9 @@
 use super::equilibrium::{Factorised, factorise, right_hand_side, solve};
 use super::path::isolated;
 use super::setup::{Conductor, Setup};
+use super::steady::difference::{DIFFERENCE, Difference, at_points, difference};
 use super::steady::{loads, scalar, summary};
-use super::{Molecular, Steady, Transient};
+use super::{KnownField, Molecular, Steady, Transient};
 use crate::error::{Error, Result};
 use crate::operator::Operator;
 use crate::physics::continuum_molecular::body::Body;
@@ -30,7 +31,7 @@ pub fn steady(
     let held = setup.held(scene, model, CONDUCTED, STEADY, None)?;
     let force = loads(scene, model, setup, CONDUCTED, STEADY)?;
     let (x, unknowns) = solve(&body, &setup.points, &held, &force)?;
-    let frame = conducted(model, steady, setup, &body, &k, &x);
+    let frame = conducted(model, steady, setup, (&body, &k), &held, &x)?;
     observer.frame(&frame)?;
     let stored = body.bond_values();
     Ok(summary(setup, unknowns, stored, 1, frame.numbers))
@@ -64,44 +65,63 @@ fn conducted(
     model: &Molecular,
     steady: &Steady,
     setup: &Setup,
-    body: &Body<1>,
-    k: &[f64],
+    (body, k): (&Body<1>, &[f64]),
+    held: &[Option<f64>],
     x: &[[f64; 1]],
-) -> Frame {
+) -> Result<Frame> {
     let values: Vec<f64> = x.iter().map(|v| v[0]).collect();
     let largest = values.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
     let mut numbers = vec![("largest".to_owned(), largest)];
-    if let Some(field) = model.known.iter().find_map(|known| match &known.field {
-        super::KnownField::Polynomial(terms) => Some(terms),
-        _ => None,
-    }) {
-        let exact = |p: usize| {
-            let x = setup.points.position(p);
-            field
-                .iter()
-                .map(|[a, b, c]| c * x[0].powf(*a) * x[1].powf(*b))
-                .sum::<f64>()
-        };
-        let errors = (0..values.len()).map(|p| (values[p] - exact(p)).abs());
-        // Unlike the largest of two, this keeps what is not a number.
-        let error = errors.fold(0.0_f64, |m, e| if m >= e { m } else { e });
-        numbers.push(("largest_difference_from_known_field".into(), error));
+    let flux = flux(setup, body, k, &values);
+    let mut fields = fluxes(&values, &flux);
+    if let Some(known) = setup.known_field::<1>(model, None) {
+        let is_held = |p: usize| held[p].is_some();
+        let of_temperature = difference(x, &known, is_held, 1);
+        numbers.extend(of_temperature.iter().flat_map(Difference::numbers));
+        fields.push(scalar(DIFFERENCE, at_points(of_temperature, x.len())));
+        let exact = known_flux(model, steady, setup)?;
+        if let Some(difference) = difference(&flux, &exact, is_held, 2) {
+            numbers.push(("relative_difference_of_flux".into(), difference.relative));
+        }
     }
     if let Some(probes) = steady.probes {
         numbers.push(("potential_drop".into(), drop(setup, probes, &values)));
     }
-    let fields = vec![
-        scalar("temperature", values.clone()),
-        Field {
-            name: "flux",
-            values: Values::Vector(flux(setup, body, k, &values)),
-        },
-    ];
-    Frame {
+    Ok(Frame {
         time: STEADY,
         numbers,
         fields,
-    }
+    })
+}
+
+/// A temperature with its flux.
+fn fluxes(temperature: &[f64], flux: &[[f64; 2]]) -> Vec<Field> {
+    vec![
+        scalar("temperature", temperature.to_vec()),
+        Field {
+            name: "flux",
+            values: Values::Vector(flux.to_vec()),
+        },
+        scalar("flux_size", flux.iter().map(|q| q[0].hypot(q[1])).collect()),
+    ]
+}
+
+/// -K ∇T of the known polynomial (eqs. 171, 172).
+fn known_flux(model: &Molecular, steady: &Steady, setup: &Setup) -> Result<Vec<[f64; 2]>> {
+    let Some(KnownField::Polynomial(terms)) = model.one_known().map(|k| &k.field) else {
+        return Ok(vec![[0.0; 2]; setup.points.len()]);
+    };
+    let [[k11, k12], [_, k22]] = *steady.conduction.tensor()?.k();
+    let slope = |n: f64, x: f64| if n == 0.0 { 0.0 } else { n * x.powf(n - 1.0) };
+    let at = |p: usize| {
+        let [x, y] = setup.points.position(p);
+        let (dx, dy) = terms.iter().fold((0.0, 0.0), |(dx, dy), [a, b, c]| {
+            let (along_x, along_y) = (slope(*a, x) * y.powf(*b), slope(*b, y) * x.powf(*a));
+            (dx + c * along_x, dy + c * along_y)
+        });
+        [-(k11 * dx + k12 * dy), -(k12 * dx + k22 * dy)]
+    };
+    Ok((0..setup.points.len()).map(at).collect())
 }
 
 /// Difference of potential between two probes.
@@ -249,13 +269,7 @@ impl TimeStepper {
                 fields: Vec::new(),
             };
             if step == steps || scene.output.due(t - self.step, t) {
-                frame.fields = vec![
-                    scalar("temperature", values.clone()),
-                    Field {
-                        name: "flux",
-                        values: Values::Vector(flux(setup, &self.body, k, &values)),
-                    },
-                ];
+                frame.fields = fluxes(&values, &flux(setup, &self.body, k, &values));
             }
             observer.frame(&frame)?;
         }

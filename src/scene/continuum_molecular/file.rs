@@ -5,6 +5,7 @@ use super::{
     Steady, TetrachiralParams, Thermal, Transient, Vibration, sweep,
 };
 use crate::error::{Error, Result};
+use crate::physics::continuum_molecular::attenuation::Attenuation;
 use crate::physics::continuum_molecular::tensor::Plane;
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +30,8 @@ pub struct MolecularFile {
     #[serde(default = "super::yes")]
     correct_surfaces: bool,
     #[serde(default)]
+    attenuation: Attenuation,
+    #[serde(default)]
     sweep: Option<sweep::Sweep>,
 }
 
@@ -45,6 +48,7 @@ struct ElasticityFile {
     plane: Option<Plane>,
     angle_deg: f64,
     calibrated: bool,
+    exponent: Option<u32>,
     bending: Option<Bending>,
     thermal: Option<Thermal>,
 }
@@ -106,6 +110,7 @@ impl TryFrom<MolecularFile> for Molecular {
             known: file.known,
             thickness: file.thickness,
             correct_surfaces: file.correct_surfaces,
+            attenuation: file.attenuation,
             sweep: file.sweep,
         })
     }
@@ -203,6 +208,7 @@ impl ElasticityFile {
         Ok(Elasticity {
             angle_deg: self.angle_deg,
             calibrated: self.calibrated,
+            exponent: self.exponent,
             bending: self.bending,
             material: self.material()?,
         })
@@ -275,6 +281,7 @@ impl From<Molecular> for MolecularFile {
             known: model.known,
             thickness: model.thickness,
             correct_surfaces: model.correct_surfaces,
+            attenuation: model.attenuation,
             sweep: model.sweep,
         };
         match model.problem {
@@ -321,6 +328,7 @@ impl From<Elasticity> for ElasticityFile {
         let mut file = ElasticityFile {
             angle_deg: elasticity.angle_deg,
             calibrated: elasticity.calibrated,
+            exponent: elasticity.exponent,
             bending: elasticity.bending,
             ..ElasticityFile::default()
         };

@@ -18,6 +18,7 @@ mod warnings;
 pub mod window;
 
 use crate::error::Result;
+use crate::physics::continuum_molecular::attenuation::Attenuation;
 use crate::physics::continuum_molecular::tensor::Plane;
 use crate::scene::conditions::Region;
 use crate::scene::frame::{Observer, Summary};
@@ -41,6 +42,8 @@ pub struct Molecular {
     pub thickness: f64,
     /// The volume method for surfaces: bonds of incomplete families are stiffened by 2 V0/(Vp + Vq).
     pub correct_surfaces: bool,
+    /// How bonds weaken with their length.
+    pub attenuation: Attenuation,
     /// Run once for each of several values of one parameter.
     pub sweep: Option<sweep::Sweep>,
 }
@@ -83,6 +86,15 @@ pub struct Transient {
     pub capacity: f64,
     /// Temperature at time 0.
     pub initial: f64,
+}
+
+impl Molecular {
+    /// The one field that all of `known` prescribe.
+    fn one_known(&self) -> Option<&Known> {
+        let first = self.known.first()?;
+        let same = |k: &Known| k.field == first.field && k.angle_deg == first.angle_deg;
+        self.known.iter().all(same).then_some(first)
+    }
 }
 
 impl Problem {
@@ -134,6 +146,8 @@ pub struct Elasticity {
     pub angle_deg: f64,
     /// Make the stencil store the exact energy of a homogeneous strain.
     pub calibrated: bool,
+    /// Even exponent of the cosⁿ law of an orthotropic body's bonds; the tensor's own angular form where there is none.
+    pub exponent: Option<u32>,
     pub bending: Option<Bending>,
 }
 
@@ -209,8 +223,8 @@ pub struct Conduction {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fracture {
-    /// Fracture energy (N/mm) of cracks normal to the material's first axis and to its second; with frequency 2 to the
-    /// direction at 45 degrees.
+    /// Fracture energy (N/mm) of cracks normal to the material's first axis and to its second; in general, to the
+    /// direction at 90 degrees over the frequency.
     pub energy: [f64; 2],
     #[serde(default = "two")]
     pub exponent: u32,
@@ -290,6 +304,7 @@ impl Checked<'_> {
     /// A body that is not held or not stable.
     pub fn run(self, observer: &mut dyn Observer) -> Result<Summary> {
         let (scene, model, setup) = (self.scene, self.model, &self.setup);
+        observer.directions(&setup.directions(model, self.inputs)?)?;
         match self.solution {
             Solution::One(bodies) => solve(scene, model, setup, *bodies, observer),
             Solution::Sweep(sweep) => sweep::run(model, sweep, setup, observer, |one, observer| {

@@ -1,13 +1,17 @@
 //! Owns what all solutions of a continuum-molecular scene start from: points, families, bodies, what is held.
 
+mod directions;
+
 use super::{Conduction, Elasticity, KnownField, Molecular};
 use crate::discretisation::plane::Points;
 use crate::discretisation::plane::family::Family;
 use crate::error::{Error, Result};
+use crate::physics::continuum_molecular::attenuation::Attenuation;
 use crate::physics::continuum_molecular::body::Body;
 use crate::physics::continuum_molecular::bond::{Bond, bonds};
 use crate::physics::continuum_molecular::conductivity::calibration;
 use crate::physics::continuum_molecular::crack_tip::CrackTip;
+use crate::physics::continuum_molecular::elastic_law::ElasticLaw;
 use crate::physics::continuum_molecular::micromoduli::Micromoduli;
 use crate::physics::continuum_molecular::tensor::PlaneTensor;
 use crate::scene::setting::{Inputs, Setting};
@@ -22,6 +26,7 @@ pub struct Setup {
     pub bonds: Vec<Bond>,
     /// Volume of a cell per unit thickness.
     pub cell: f64,
+    attenuation: Attenuation,
     /// Volumes (in cells) of the families of points in boundary layers, where the body goes on beyond its points; only
     /// cracks cut them.
     layer: Vec<Option<f64>>,
@@ -68,6 +73,7 @@ impl Setup {
             family,
             bonds: all,
             cell,
+            attenuation: model.attenuation,
             layer,
         })
     }
@@ -76,15 +82,44 @@ impl Setup {
         self.family.stencil.horizon
     }
 
-    pub fn micromoduli(
-        &self,
-        elasticity: &Elasticity,
-        tensor: &PlaneTensor,
-    ) -> Result<Micromoduli> {
-        match elasticity.calibrated {
-            true => Micromoduli::calibrated(tensor, &self.bonds),
-            false => Ok(Micromoduli::new(tensor, self.horizon())),
-        }
+    /// Λ of a bond.
+    pub fn attenuation(&self, bond: &Bond) -> f64 {
+        self.attenuation.at(bond.length_mm / self.horizon())
+    }
+
+    /// What Λ leaves of the elastic energy at equal micromoduli.
+    pub fn elastic_share(&self) -> f64 {
+        self.attenuation.elastic_share()
+    }
+
+    /// Micromoduli by direction, without Λ.
+    ///
+    /// # Errors
+    /// A stencil that cannot be calibrated, a tensor that the law of `exponent` cannot have.
+    pub fn micromoduli(&self, elasticity: &Elasticity, tensor: &PlaneTensor) -> Result<ElasticLaw> {
+        let law = match (elasticity.exponent, elasticity.calibrated) {
+            (None, true) => {
+                let attenuated = |b: &Bond| Bond {
+                    volume_mm2: self.attenuation(b) * b.volume_mm2,
+                    ..*b
+                };
+                let bonds: Vec<Bond> = self.bonds.iter().map(attenuated).collect();
+                return Ok(ElasticLaw::Tensor(Micromoduli::calibrated(tensor, &bonds)?));
+            }
+            (None, false) => ElasticLaw::Tensor(Micromoduli::new(tensor, self.horizon())),
+            (Some(_), true) => {
+                return Err(Error::setting(
+                    "elasticity.calibrated",
+                    "true with elasticity.exponent: that law has four values for the six sums of a stencil",
+                    "leave one of them out",
+                ));
+            }
+            (Some(n), false) => {
+                let zeta = elasticity.angle_deg.to_radians();
+                ElasticLaw::cosine(tensor, self.horizon(), n, zeta)?
+            }
+        };
+        Ok(law.scaled(self.attenuation.elastic_share().recip()))
     }
 
     /// Bonds of the body, each once.
@@ -104,7 +139,9 @@ impl Setup {
     pub fn conductor(&self, model: &Molecular, conduction: &Conduction) -> Result<Conductor> {
         let tensor = conduction.tensor()?;
         let law = tensor.microconductivity(self.horizon(), conduction.exponent)?;
-        let mut k: Vec<f64> = self.bonds.iter().map(|b| law.at(b.psi())).collect();
+        let share = self.attenuation.conducted_share();
+        let at = |b: &Bond| self.attenuation(b) / share * law.at(b.psi());
+        let mut k: Vec<f64> = self.bonds.iter().map(at).collect();
         if conduction.calibrated {
             let c = calibration(&self.bonds, &k, tensor.k())?;
             k.iter_mut()
@@ -175,6 +212,22 @@ impl Setup {
             }
         }
         Ok(held)
+    }
+
+    /// The one field that all of `known` prescribe, at every point; None where there is none, or several.
+    pub fn known_field<const D: usize>(
+        &self,
+        model: &Molecular,
+        tensor: Option<&PlaneTensor>,
+    ) -> Option<Vec<[f64; D]>> {
+        let known = model.one_known()?;
+        let turn = known.angle_deg.to_radians();
+        let tip = tensor.map(|t| CrackTip::new(&t.turned(-turn)));
+        let at = |p: usize| {
+            let values = known_values(&known.field, self.points.position(p), turn, tip.as_ref());
+            values.map(|v| v.unwrap_or(0.0))
+        };
+        Some((0..self.points.len()).map(at).collect())
     }
 
     /// Values held by `known`, each with the place in the list of what prescribes it: the last.

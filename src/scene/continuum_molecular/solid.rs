@@ -7,7 +7,7 @@ use crate::physics::continuum_molecular::body::Body;
 use crate::physics::continuum_molecular::bond::{Bond, Deformation, Moduli};
 use crate::physics::continuum_molecular::conductivity::{Conductivity, calibration};
 use crate::physics::continuum_molecular::cosine::CosineLaw;
-use crate::physics::continuum_molecular::micromoduli::Micromoduli;
+use crate::physics::continuum_molecular::elastic_law::ElasticLaw;
 use crate::physics::continuum_molecular::tensor::PlaneTensor;
 use crate::scene::setting::Setting;
 
@@ -25,7 +25,7 @@ pub const DISPLACEMENT: [&[&str]; 3] = [&["x"], &["y"], &["rotation"]];
 
 impl Elasticity {
     /// Whether points turn: without shear and bending micromoduli there is nothing to turn, and two unknowns per point.
-    pub fn turns(&self, micro: &Micromoduli) -> bool {
+    pub fn turns(&self, micro: &ElasticLaw) -> bool {
         !micro.is_central() || self.bending.is_some()
     }
 }
@@ -43,10 +43,16 @@ impl<const D: usize> Solid<D> {
             Some(b) => bending_moduli(b, elasticity, setup)?,
             None => vec![0.0; setup.bonds.len()],
         };
-        let law = |(b, bending): (&Bond, f64)| Moduli {
-            axial: micro.axial(b.psi()),
-            shear: if D == 2 { 0.0 } else { micro.shear(b.psi()) },
-            bending,
+        let law = |(b, bending): (&Bond, f64)| {
+            let attenuation = setup.attenuation(b);
+            Moduli {
+                axial: attenuation * micro.axial(b.psi()),
+                shear: match D {
+                    2 => 0.0,
+                    _ => attenuation * micro.shear(b.psi()),
+                },
+                bending,
+            }
         };
         let moduli: Vec<Moduli> = setup.bonds.iter().zip(bending).map(law).collect();
         let blocks = setup
@@ -125,7 +131,9 @@ pub fn bending_moduli(
     let zeta = elasticity.angle_deg.to_radians();
     let scale = 6.0 / setup.horizon().powi(3);
     let law = CosineLaw::of_second_moment(scale * first, scale * second, exponent, zeta)?;
-    let mut k: Vec<f64> = setup.bonds.iter().map(|b| law.at(b.psi())).collect();
+    let share = setup.elastic_share();
+    let at = |b: &Bond| setup.attenuation(b) / share * law.at(b.psi());
+    let mut k: Vec<f64> = setup.bonds.iter().map(at).collect();
     if elasticity.calibrated {
         let conducted: Vec<f64> = k
             .iter()

@@ -1,5 +1,8 @@
 //! Owns solutions of elastic bodies without cracks that grow, and what all solutions report.
 
+pub mod difference;
+mod section;
+
 use super::Molecular;
 use super::equilibrium::solve;
 use super::setup::Setup;
@@ -7,6 +10,8 @@ use super::solid::Solid;
 use crate::error::Result;
 use crate::scene::frame::{Field, Frame, Observer, Summary, Values};
 use crate::scene::setting::Setting;
+use difference::{DIFFERENCE, Difference, at_points, difference};
+use section::sections;
 
 /// Forces of thermal strain: each bond pushes with its stiffness times the stretch (and shear) that it would have if
 /// free (eq. 176).
@@ -102,6 +107,12 @@ pub fn deform<const D: usize>(
         numbers.push(("energy_density_local".into(), exact));
     }
     let mut fields = vec![displacement(&x, 1.0)];
+    if let Some(known) = setup.known_field::<D>(model, Some(&solid.tensor)) {
+        let held = |p: usize| (0..D).all(|d| solid.held[p * D + d].is_some());
+        let difference = difference(&x, &known, held, 2);
+        numbers.extend(difference.iter().flat_map(Difference::numbers));
+        fields.push(scalar(DIFFERENCE, at_points(difference, x.len())));
+    }
     if D == 3 {
         fields.push(scalar("rotation", x.iter().map(|u| u[2]).collect()));
     }
@@ -110,6 +121,11 @@ pub fn deform<const D: usize>(
     fields.push(scalar("stress_xx", s11));
     fields.push(scalar("stress_yy", s22));
     fields.push(scalar("stress_xy", s12));
+    let sections = sections(&solid, setup, &x);
+    let component = |of: &[[f64; 2]], i: usize| of.iter().map(|t| t[i]).collect();
+    fields.push(scalar("section_xx", component(&sections.normal_x, 0)));
+    fields.push(scalar("section_yy", component(&sections.normal_y, 1)));
+    fields.push(scalar("section_xy", component(&sections.normal_y, 0)));
     observer.frame(&Frame {
         time: t,
         numbers: numbers.clone(),

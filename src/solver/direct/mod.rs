@@ -3,6 +3,7 @@
 pub mod cholesky_f32;
 pub mod dissection;
 pub mod inertia;
+pub mod network;
 pub mod schur;
 
 use crate::error::{Error, Result};
@@ -71,6 +72,23 @@ impl DirectLlt {
     /// [`nested_dissection`](crate::solver::direct::dissection::nested_dissection).
     pub fn new(a: &Sparse, order: &[usize]) -> Result<Self> {
         let symbolic = symbolic_cholesky(a, order)?;
+        let scratch = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
+        Ok(DirectLlt {
+            symbolic,
+            numeric: Vec::new(),
+            solve_scratch: MemBuffer::new(scratch),
+        })
+    }
+
+    /// In an order that keeps the factor sparse (AMD), where no geometry gives a better one.
+    pub fn sparse(a: &Sparse) -> Result<Self> {
+        let symbolic = factorize_symbolic_cholesky(
+            pattern(a),
+            Side::Upper,
+            SymmetricOrdering::Amd,
+            CholeskySymbolicParams::default(),
+        )
+        .map_err(|e| failed("Cholesky", format!("{e:?}")))?;
         let scratch = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
         Ok(DirectLlt {
             symbolic,

@@ -5,14 +5,15 @@ mod cost;
 mod mixed_tissue;
 pub mod sites;
 mod stress;
+mod thin;
 
 use crate::discretisation::lattice::placement::Frame;
 use crate::discretisation::lattice::sites::Grips;
 use crate::error::{Error, Result};
 use crate::measure::apparent::Loaded;
-use crate::operator::coarsen::Coarsen;
 use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::Virial;
+use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::{EndSites, Places, System};
 use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::ends::reactions::End;
@@ -103,7 +104,7 @@ impl<'a> Placed<'a> {
         }
     }
 
-    fn system<O: MixedPrecision, C: Coarsen, M: Virial>(
+    fn system<O: MixedPrecision, C: Precondition, M: Virial>(
         self,
         operator: &'a O,
         springs: C,

@@ -4,7 +4,6 @@ use crate::error::Result;
 use crate::measure::apparent::EndWork;
 use crate::operator::{Functional, MixedPrecision};
 use crate::physics::lattice::Lattice;
-use crate::physics::lattice::multigrid::Springs;
 use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::{
     Cost, Discretisation, Known, LoadSet, Places, Prepared, System,
@@ -13,6 +12,7 @@ use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded, SiteFields};
 use crate::pipeline::apparent::lattice::mixed_tissue::Blend;
 use crate::pipeline::apparent::lattice::stress::Stress;
+use crate::pipeline::apparent::lattice::thin::ThinOrPlump;
 use crate::pipeline::apparent::lattice::{Placed, cost, label, refuse_unit_strains};
 use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::solved::Moduli;
@@ -124,7 +124,7 @@ impl Discretisation for SiteModel {
         let goal = self.whole.is_some().then(|| self.stress());
         placed.system(
             &self.lattice,
-            Springs::new(&self.lattice),
+            ThinOrPlump::new(&self.lattice),
             goal,
             (params, self.motion),
             self.lattice.sites.volume_mm3(),

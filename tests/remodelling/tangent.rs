@@ -98,6 +98,7 @@ impl Toy {
             given: &self.given,
             old: &self.old,
             dt: 0.1,
+            load: &[],
         }
     }
 }

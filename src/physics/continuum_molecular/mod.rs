@@ -11,6 +11,7 @@ pub mod conductivity;
 pub mod cosine;
 pub mod crack_tip;
 pub mod micromoduli;
+pub mod piezoresistance;
 pub mod small;
 pub mod tensor;
 pub mod tetrachiral;

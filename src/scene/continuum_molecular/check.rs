@@ -175,10 +175,15 @@ fn scalars(model: &Molecular, turns: bool) -> Vec<&'static str> {
         } => vec!["damage"],
         Problem::Fracture { .. } => vec!["damage", "potential"],
         Problem::Vibration { .. } => vec!["magnitude"],
-        Problem::Static { .. } if turns => {
-            vec!["rotation", "energy", "stress_xx", "stress_yy", "stress_xy"]
+        Problem::Static { conduction, .. } => {
+            let turned = turns.then_some("rotation");
+            let coupled = conduction.as_ref().map(|c| match c.piezoresistance {
+                Some(_) => "potential",
+                None => "temperature",
+            });
+            let elastic = ["energy", "stress_xx", "stress_yy", "stress_xy"];
+            turned.into_iter().chain(elastic).chain(coupled).collect()
         }
-        Problem::Static { .. } => vec!["energy", "stress_xx", "stress_yy", "stress_xy"],
     }
 }
 

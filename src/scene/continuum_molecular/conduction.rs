@@ -15,7 +15,7 @@ use crate::scene::setting::Setting;
 pub const CONDUCTED: [&[&str]; 1] = [&["temperature", "potential"]];
 
 /// Time at which schedules of a steady scene are read.
-const STEADY: f64 = 1.0;
+pub const STEADY: f64 = 1.0;
 
 /// Steady conduction.
 pub fn steady(

@@ -67,6 +67,9 @@ struct ConductionFile {
     initial: Option<f64>,
     #[serde(default)]
     probes: Option<[[f64; 2]; 2]>,
+    /// With elasticity.
+    #[serde(default)]
+    piezoresistance: Option<f64>,
 }
 
 fn one() -> f64 {
@@ -120,10 +123,11 @@ fn elastic(
     let thermal = file.thermal.take();
     let elasticity = file.elasticity()?;
     let Some(fracture) = fracture else {
-        refuse_conduction(conduction.is_some())?;
+        coupled(thermal.as_ref(), conduction.as_ref())?;
         return Ok(Problem::Static {
             elasticity,
             thermal,
+            conduction: conduction.map(ConductionFile::steady).transpose()?,
         });
     };
     if thermal.is_some() {
@@ -147,6 +151,45 @@ fn elastic(
     })
 }
 
+/// # Errors
+/// Elasticity and conduction that do not act on each other, or both ways at a time; a rise of temperature from nowhere, or twice.
+fn coupled(thermal: Option<&Thermal>, conduction: Option<&ConductionFile>) -> Result<()> {
+    if thermal.is_some_and(|t| t.rise.is_some() && t.reference.is_some()) {
+        return refuse(
+            "elasticity.thermal.reference",
+            "a reference temperature beside a rise, which is one above it",
+            OUT,
+        );
+    }
+    let is_warmed = thermal.is_some_and(|t| t.rise.is_none());
+    let Some(conduction) = conduction else {
+        return match is_warmed {
+            false => Ok(()),
+            true => refuse(
+                "elasticity.thermal.rise",
+                "no temperature rise, and no conduction to take it from",
+                "give rise = [T0, dT/dx, dT/dy], or the table of conduction",
+            ),
+        };
+    };
+    if conduction.capacity.is_some() {
+        return refuse(
+            "conduction.capacity",
+            "a heat capacity with elasticity, where temperature and potential are steady",
+            OUT,
+        );
+    }
+    match (is_warmed, conduction.piezoresistance.is_some()) {
+        (false, false) => refuse_conduction(true),
+        (true, true) => refuse(
+            "conduction.piezoresistance",
+            "one conduction for the temperature of elasticity.thermal and for a potential that strain changes",
+            "leave one of them out, or give elasticity.thermal.rise",
+        ),
+        _ => Ok(()),
+    }
+}
+
 fn vibrating(file: ElasticityFile, vibration: Vibration, conducts: bool) -> Result<Problem> {
     refuse_conduction(conducts)?;
     if file.thermal.is_some() {
@@ -167,8 +210,9 @@ fn refuse_conduction(conducts: bool) -> Result<()> {
         false => Ok(()),
         true => refuse(
             MODEL,
-            "elasticity and conduction without fracture, which do not act on each other",
-            "make two scenes, or add the table of fracture: broken bonds stop conducting",
+            "elasticity and conduction that do not act on each other",
+            "make two scenes, or couple them: fracture (broken bonds stop conducting), elasticity.thermal without rise (the \
+             temperature strains the body), or conduction.piezoresistance (strain changes what bonds conduct)",
         ),
     }
 }
@@ -181,6 +225,13 @@ fn conducting(file: Option<ConductionFile>) -> Result<Problem> {
             "add the table of at least one",
         );
     };
+    if file.piezoresistance.is_some() {
+        return refuse(
+            "conduction.piezoresistance",
+            "a change of conductivity with strain, but no elasticity",
+            "leave it out, or add the table of elasticity",
+        );
+    }
     let Some(capacity) = file.capacity else {
         return Ok(Problem::Steady(file.steady()?));
     };
@@ -250,6 +301,7 @@ impl ConductionFile {
         }
         Ok(Steady {
             probes: self.probes,
+            piezoresistance: self.piezoresistance,
             conduction: self.conduction(),
         })
     }
@@ -281,7 +333,9 @@ impl From<Molecular> for MolecularFile {
             Problem::Static {
                 elasticity,
                 thermal,
+                conduction,
             } => {
+                file.conduction = conduction.map(ConductionFile::from);
                 file.elasticity = Some(ElasticityFile {
                     thermal,
                     ..elasticity.into()
@@ -350,6 +404,7 @@ impl From<Conduction> for ConductionFile {
             capacity: None,
             initial: None,
             probes: None,
+            piezoresistance: None,
         }
     }
 }
@@ -358,6 +413,7 @@ impl From<Steady> for ConductionFile {
     fn from(steady: Steady) -> Self {
         ConductionFile {
             probes: steady.probes,
+            piezoresistance: steady.piezoresistance,
             ..steady.conduction.into()
         }
     }

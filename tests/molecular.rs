@@ -3,6 +3,7 @@
 mod breaking;
 mod costs;
 mod couple_stress;
+mod coupled;
 mod fields;
 mod heat;
 mod history;

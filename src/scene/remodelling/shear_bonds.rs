@@ -21,7 +21,8 @@ impl BondBasedParams {
 
     /// Whether the scene needs more than bonds under stretch in one load case.
     pub fn is_extended(&self) -> bool {
-        !self.cases.is_empty() || (self.poisson - CENTRAL).abs() > NEAR
+        let off = (self.poisson - CENTRAL).abs();
+        !self.cases.is_empty() || off.is_nan() || off > NEAR
     }
 
     fn micromoduli(&self, stencil: &Stencil) -> Result<Micromoduli> {

@@ -126,7 +126,10 @@ fn neo_hooke(lambda: f64, mu: f64, f: &Plane) -> Response {
 /// The point's rotation is the mean of the directions' by `b`, at which the energy is stationary: the stress is the partial derivative,
 /// and the tangent loses what the rotation gives way.
 fn shear_bonds(directions: &[([f64; 2], [f64; 2])], f: &Plane) -> Response {
-    let along = directions.iter().map(|(n, [a, _])| (*n, *a)).collect::<Vec<_>>();
+    let along = directions
+        .iter()
+        .map(|(n, [a, _])| (*n, *a))
+        .collect::<Vec<_>>();
     let mut sum = bonds(&along, f);
     let moved = |n: &[f64; 2]| [0, 1].map(|i| f[i][0] * n[0] + f[i][1] * n[1]);
     let angle = |n: &[f64; 2]| {
@@ -134,7 +137,11 @@ fn shear_bonds(directions: &[([f64; 2], [f64; 2])], f: &Plane) -> Response {
         (n[0] * v[1] - n[1] * v[0]).atan2(n[0] * v[0] + n[1] * v[1])
     };
     let whole: f64 = directions.iter().map(|(_, [_, b])| b).sum();
-    let turned: f64 = directions.iter().map(|(n, [_, b])| b * angle(n)).sum::<f64>() / whole;
+    let turned: f64 = directions
+        .iter()
+        .map(|(n, [_, b])| b * angle(n))
+        .sum::<f64>()
+        / whole;
     let mut give = [[0.0; 2]; 2];
     for (n, [_, b]) in directions {
         let v = moved(n);

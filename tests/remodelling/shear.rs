@@ -21,7 +21,10 @@ fn the_tangent_is_exact_for_bonds_that_shear() {
             micromoduli: Micromoduli::discrete(1.0, poisson, &stencil),
             family: Family::new(&points, n, stencil.clone()),
             young: 1.0,
-            weight: Weight { reference: 1.1, exponent: 2.0 },
+            weight: Weight {
+                reference: 1.1,
+                exponent: 2.0,
+            },
             growth: Some(Growth {
                 reference: 1.1,
                 rate: 1000.0,
@@ -49,7 +52,13 @@ fn the_tangent_is_exact_for_bonds_that_shear() {
             }
         };
         let given: Vec<f64> = (0..map.values())
-            .map(|v| if map.unknown(v).is_none() { rest(v) } else { 0.0 })
+            .map(|v| {
+                if map.unknown(v).is_none() {
+                    rest(v)
+                } else {
+                    0.0
+                }
+            })
             .collect();
         let q: Vec<f64> = (0..map.unknowns())
             .map(|k| rest(map.equation(k)) + 0.2 * wobble(k))
@@ -74,8 +83,16 @@ const TIMES: [f64; 4] = [2.0, 4.0, 6.0, 8.0];
 
 /// ν, the limit in a full circle, and along the stencil of δ/Δ = 3.01.
 const LIMITS: [(f64, [f64; 4], [f64; 4]); 2] = [
-    (0.2, [-0.274804, 0.135143, 0.637484, 1.232476], [-0.267624, 0.146298, 0.653460, 1.254099]),
-    (0.3, [-0.265229, 0.153539, 0.668758, 1.281314], [-0.251916, 0.174316, 0.698685, 1.322084]),
+    (
+        0.2,
+        [-0.274804, 0.135143, 0.637484, 1.232476],
+        [-0.267624, 0.146298, 0.653460, 1.254099],
+    ),
+    (
+        0.3,
+        [-0.265229, 0.153539, 0.668758, 1.281314],
+        [-0.251916, 0.174316, 0.698685, 1.322084],
+    ),
 ];
 
 #[test]
@@ -94,8 +111,14 @@ fn local_limits_of_bonds_that_shear() {
 fn peridynamics_tends_to_the_limit_of_its_poissons_ratio() {
     for (poisson, _, [.., limit]) in LIMITS {
         let at = |n: usize| {
-            let square = Square { rows: 4, ..Square::new(n, 3.01) };
-            let text = square.text().replace("young = 1.0", &format!("young = 1.0\n poisson = {poisson:?}"));
+            let square = Square {
+                rows: 4,
+                ..Square::new(n, 3.01)
+            };
+            let text = square.text().replace(
+                "young = 1.0",
+                &format!("young = 1.0\n poisson = {poisson:?}"),
+            );
             let (summary, recorder) = simulate(&text).unwrap();
             // Density, two placements and a rotation, less the pinned x.
             assert_eq!(summary.unknowns, 4 * 4 * n - 1);
@@ -103,7 +126,10 @@ fn peridynamics_tends_to_the_limit_of_its_poissons_ratio() {
         };
         let (coarse, fine) = (at(20), at(40));
         // At ν = 1/3: -0.0681 and -0.0340.
-        assert!(coarse < -0.02 && (coarse / fine - 2.0).abs() < 0.03, "{poisson}: {coarse} {fine}");
+        assert!(
+            coarse < -0.02 && (coarse / fine - 2.0).abs() < 0.03,
+            "{poisson}: {coarse} {fine}"
+        );
     }
 }
 
@@ -159,11 +185,15 @@ fn a_force_stretches_a_bar_of_bonds() {
         let error = |n: usize| {
             let (summary, recorder) = simulate(&bar(n, force, model)).unwrap();
             assert!(summary.converged, "{summary:?}");
-            let strain = (recorder.at(1.0, "b.ux") - recorder.at(1.0, "a.ux")) / (1.0 + 1.0 / n as f64);
+            let strain =
+                (recorder.at(1.0, "b.ux") - recorder.at(1.0, "a.ux")) / (1.0 + 1.0 / n as f64);
             strain * young / force - 1.0
         };
         let (coarse, fine) = (error(10), error(20));
-        assert!(coarse > 0.02 && coarse < 0.3 && (coarse / fine - 2.0).abs() < 0.3, "{model}: {coarse} {fine}");
+        assert!(
+            coarse > 0.02 && coarse < 0.3 && (coarse / fine - 2.0).abs() < 0.3,
+            "{model}: {coarse} {fine}"
+        );
     }
 }
 
@@ -172,7 +202,11 @@ fn a_force_stretches_a_bar_of_bonds() {
 #[test]
 fn bone_under_a_force_settles_where_energy_is_half_the_work() {
     let force = 1e-3;
-    for more in ["poisson = 0.2", "poisson = 0.2\n solver = { method = 'reuse', tolerance = 1e-9 }", ""] {
+    for more in [
+        "poisson = 0.2",
+        "poisson = 0.2\n solver = { method = 'reuse', tolerance = 1e-9 }",
+        "",
+    ] {
         let model = format!("{more}\n growth = {{ rate = 1e6, stimulus = 5e-7 }}");
         let text = bar(6, force, &model).replace("end = 1.0\n", "end = 60.0\n");
         let (summary, recorder) = simulate(&text).unwrap();
@@ -182,7 +216,10 @@ fn bone_under_a_force_settles_where_energy_is_half_the_work() {
         };
         let energy: f64 = change.iter().map(|c| 5e-7 * (1.0 + c).powi(3) / 36.0).sum();
         let work = 0.5 * force * recorder.at(60.0, "end.ux");
-        assert!((energy / work - 1.0).abs() < 0.01, "{more}: {energy} {work}");
+        assert!(
+            (energy / work - 1.0).abs() < 0.01,
+            "{more}: {energy} {work}"
+        );
     }
 }
 
@@ -203,14 +240,20 @@ fn load_cases_weigh_energies() {
     for poisson in ["poisson = 0.2", ""] {
         let one = last_change(&bar(6, force, &format!("{poisson}\n {growth}")));
         let cases = |weights: [f64; 2]| {
-            format!("{poisson}\n cases = [{{ name = 'a', weight = {:?} }}, {{ name = 'b', weight = {:?} }}]", weights[0], weights[1])
+            format!(
+                "{poisson}\n cases = [{{ name = 'a', weight = {:?} }}, {{ name = 'b', weight = {:?} }}]",
+                weights[0], weights[1]
+            )
         };
         let both = last_change(&bar(6, force, &format!("{}\n {growth}", cases([2.0, 5.0]))));
         let near = |x: &[f64], y: &[f64]| x.iter().zip(y).all(|(x, y)| (x - y).abs() < 1e-8);
         assert!(near(&one, &both), "{poisson}");
         let idle = "[[load]]\n region = { point = [0, 0] }\n component = 'x'\n case = 'b'\n value = 0\n [[probe]]\n name = 'a'";
         let text = bar(6, force, &format!("{}\n {growth}", cases([1.0, 3.0])))
-            .replace("component = 'x'\n         value = { times", "component = 'x'\n case = 'a'\n value = { times")
+            .replace(
+                "component = 'x'\n         value = { times",
+                "component = 'x'\n case = 'a'\n value = { times",
+            )
             .replacen("[[probe]]\n         name = 'a'", idle, 1);
         assert!(text.contains("case = 'a'") && text.contains("case = 'b'"));
         let slow = "growth = { rate = 2.5e4, stimulus = 2e-6 }";
@@ -224,8 +267,17 @@ fn load_cases_weigh_energies() {
 #[test]
 fn neo_hooke_meets_st_venant_kirchhoff_at_small_strain() {
     let at = |steps: [f64; 4], law: &str| {
-        let text = local_text(1, steps, false, law).replace("stimulus = 0.01", &format!("stimulus = {:e}", 0.01 * (steps[0] / 0.06).powi(2)));
-        simulate(&text.replace("rate = 1000", &format!("rate = {:e}", 1000.0 * (0.06 / steps[0]).powi(2)))).unwrap().1.means(TIMES)
+        let text = local_text(1, steps, false, law).replace(
+            "stimulus = 0.01",
+            &format!("stimulus = {:e}", 0.01 * (steps[0] / 0.06).powi(2)),
+        );
+        simulate(&text.replace(
+            "rate = 1000",
+            &format!("rate = {:e}", 1000.0 * (0.06 / steps[0]).powi(2)),
+        ))
+        .unwrap()
+        .1
+        .means(TIMES)
     };
     let (neo, law) = ("energy = 'neo-hooke'\n poisson = 0.2", "poisson = 0.2");
     let small = S2.map(|u| 1e-3 * u);
@@ -239,19 +291,43 @@ fn what_bonds_cannot_do_is_refused_in_words() {
     for (model, words) in [
         ("poisson = 0.4", "to 1/3"),
         ("poisson = nan", "physics.bond-based.poisson"),
-        ("poisson = 0.2\n micromodulus = { finite = 0.1 }", "micromodulus.finite"),
+        (
+            "poisson = 0.2\n micromodulus = { finite = 0.1 }",
+            "micromodulus.finite",
+        ),
         ("cases = [{ name = 'a', weight = 0 }]", "cases[0].weight"),
-        ("cases = [{ name = 'a', weight = 1 }, { name = 'a', weight = 1 }]", "a name of its own"),
+        (
+            "cases = [{ name = 'a', weight = 1 }, { name = 'a', weight = 1 }]",
+            "a name of its own",
+        ),
     ] {
-        let error = simulate(&bar(6, 1e-3, model)).map(|_| ()).unwrap_err().to_string();
+        let error = simulate(&bar(6, 1e-3, model))
+            .map(|_| ())
+            .unwrap_err()
+            .to_string();
         assert!(error.contains(words), "{words}: {error}");
     }
     let unnamed = bar(6, 1e-3, "").replace("value = { times", "case = 'b'\n value = { times");
-    let named = bar(6, 1e-3, "cases = [{ name = 'a', weight = 1 }]").replace("value = { times", "case = 'b'\n value = { times");
-    for (text, words) in [(unnamed, "has load cases"), (named, "no [[load]] belongs to case")] {
+    let named = bar(6, 1e-3, "cases = [{ name = 'a', weight = 1 }]")
+        .replace("value = { times", "case = 'b'\n value = { times");
+    for (text, words) in [
+        (unnamed, "has load cases"),
+        (named, "no [[load]] belongs to case"),
+    ] {
         let error = simulate(&text).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(words), "{words}: {error}");
     }
-    let bonds = simulate(&local_text(1, S2, false, "energy = 'stencil-bonds'\n poisson = 0.4"));
-    assert!(bonds.map(|_| ()).unwrap_err().to_string().contains("which no bonds have"));
+    let bonds = simulate(&local_text(
+        1,
+        S2,
+        false,
+        "energy = 'stencil-bonds'\n poisson = 0.4",
+    ));
+    assert!(
+        bonds
+            .map(|_| ())
+            .unwrap_err()
+            .to_string()
+            .contains("which no bonds have")
+    );
 }

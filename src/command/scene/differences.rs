@@ -79,9 +79,9 @@ pub fn write(
     points: &Points,
     other: &Other,
 ) -> Result<Option<String>> {
-    let mut rows =
-        vec!["t,mean,mean_abs,p95_abs,max_abs,share_above_0.1,share_above_0.3,correlation"
-            .to_owned()];
+    let mut rows = vec![
+        "t,mean,mean_abs,p95_abs,max_abs,share_above_0.1,share_above_0.3,correlation".to_owned(),
+    ];
     let mut missing = Vec::new();
     for (t, scalars) in maps {
         let Some((name, values)) = scalars.first() else {

@@ -33,7 +33,11 @@ impl Micromoduli {
 
     /// `12 (λ + μ)/(π δ³)` and `12 (μ − λ)/(π δ³)`: the same of the integral over the horizon.
     pub fn continuous(young: f64, poisson: f64, stencil: &Stencil) -> Self {
-        Self::over(young, poisson, 12.0 / (std::f64::consts::PI * stencil.horizon.powi(3)))
+        Self::over(
+            young,
+            poisson,
+            12.0 / (std::f64::consts::PI * stencil.horizon.powi(3)),
+        )
     }
 
     fn over(young: f64, poisson: f64, scale: f64) -> Self {
@@ -118,7 +122,12 @@ impl ShearBonds {
 
     fn value(&self, case: usize, p: usize, d: usize) -> usize {
         let first = self.points * (1 + case * self.components());
-        first + if d == 2 { 2 * self.points + p } else { 2 * p + d }
+        first
+            + if d == 2 {
+                2 * self.points + p
+            } else {
+                2 * p + d
+            }
     }
 
     fn place(&self, value: usize) -> Place {
@@ -200,9 +209,9 @@ impl ShearBonds {
                 Place::Motion(case, a, _) => (a, case..case + 1),
             };
             for i in self.family.of(a).map(|(i, _)| i).chain([a]) {
-                let moved = cases.clone().flat_map(|case| {
-                    (0..self.components()).map(move |d| self.value(case, i, d))
-                });
+                let moved = cases
+                    .clone()
+                    .flat_map(|case| (0..self.components()).map(move |d| self.value(case, i, d)));
                 let columns = moved.chain([i]).filter_map(|v| map.unknown(v));
                 list.extend(columns.filter(|&q| q >= first).map(|q| (q - first) as u32));
             }
@@ -218,7 +227,13 @@ impl ShearStep<'_> {
     }
 
     /// Balance of mass at point `a`, whose energy in each case is `energy`.
-    fn balance(&self, growth: &Growth, values: &[f64], a: usize, energy: impl Fn(usize) -> f64) -> Balance {
+    fn balance(
+        &self,
+        growth: &Growth,
+        values: &[f64],
+        a: usize,
+        energy: impl Fn(usize) -> f64,
+    ) -> Balance {
         let cases = self.model.cases.iter().enumerate();
         let stimulus = cases.map(|(case, weight)| weight * energy(case)).sum();
         growth.balance(values[a], self.old[a], stimulus, self.dt)
@@ -241,7 +256,9 @@ impl ShearStep<'_> {
         let Some(growth) = &model.growth else {
             return;
         };
-        let balance = self.balance(growth, values, a, |case| model.state(values, case, a).energy);
+        let balance = self.balance(growth, values, a, |case| {
+            model.state(values, case, a).energy
+        });
         add(row, balance.by_density);
         for (case, weight) in model.cases.iter().enumerate() {
             let half = 0.5 * balance.by_energy * weight;

@@ -36,7 +36,8 @@ mod tests {
             let psi = std::f64::consts::TAU * i as f64 / n as f64;
             let (y, x) = psi.sin_cos();
             let s = e11 * x * x + e22 * y * y + 2.0 * e12 * x * y;
-            let weight = 0.25 * micro.at(psi) * law.factor(s).unwrap() * std::f64::consts::TAU / n as f64;
+            let weight =
+                0.25 * micro.at(psi) * law.factor(s).unwrap() * std::f64::consts::TAU / n as f64;
             for (sum, nn) in sum.iter_mut().zip([x * x, y * y, x * y]) {
                 *sum += weight * nn;
             }

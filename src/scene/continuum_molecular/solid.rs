@@ -78,7 +78,12 @@ impl<const D: usize> Solid<D> {
                     ..
                 } => thermal.rise.map(|rise| Warm {
                     expansion: thermal.expansion,
-                    rise: setup.points.positions().iter().map(|x| linear(rise, *x)).collect(),
+                    rise: setup
+                        .points
+                        .positions()
+                        .iter()
+                        .map(|x| linear(rise, *x))
+                        .collect(),
                 }),
                 _ => None,
             },
@@ -101,13 +106,7 @@ impl<const D: usize> Solid<D> {
     }
 
     /// What bond `b` from `p` to `q` carries: its deformation less the thermal one, s - αT (eq. 176).
-    pub fn strained(
-        &self,
-        x: &[[f64; D]],
-        p: usize,
-        q: usize,
-        b: &Bond,
-    ) -> Deformation {
+    pub fn strained(&self, x: &[[f64; D]], p: usize, q: usize, b: &Bond) -> Deformation {
         let mut d = b.deformation(&x[p], &x[q]);
         let [stretch, shear] = self.free_strain(p, q, b);
         (d.stretch, d.shear) = (d.stretch - stretch, d.shear - shear);

@@ -190,11 +190,7 @@ impl Model for BondBased {
 }
 
 impl Micromodulus {
-    fn value(
-        self,
-        young: f64,
-        stencil: &Stencil,
-    ) -> Result<f64> {
+    fn value(self, young: f64, stencil: &Stencil) -> Result<f64> {
         if !(young.is_finite() && young > 0.0) {
             return Err(Error::setting(
                 "physics.bond-based.young",

@@ -71,6 +71,10 @@ fn cases_of(load: &Load, k: usize, cases: &[&str]) -> Result<Option<usize>> {
             [] => "leave it out: only [physics.bond-based] with `cases` has load cases".to_owned(),
             _ => format!("the scene has {}", cases.join(", ")),
         };
-        Error::setting(format!("load[{k}].case"), format!("found \"{name}\""), there)
+        Error::setting(
+            format!("load[{k}].case"),
+            format!("found \"{name}\""),
+            there,
+        )
     })
 }

@@ -1,12 +1,12 @@
 //! Owns scenes of bonds that resist shear, and of several load cases.
 
+use crate::discretisation::plane::family::{Family, Stencil};
 use crate::error::{Error, Result};
 use crate::operator::reduction::Reduction;
 use crate::operator::sparse::Sparse;
 use crate::physics::bond_based::shear::{Micromoduli, ShearBonds, ShearStep};
-use crate::discretisation::plane::family::{Family, Stencil};
-use crate::scene::remodelling::bond_based::{BondBasedParams, CENTRAL, Case, Micromodulus, Start};
 use crate::scene::remodelling::body::Motion;
+use crate::scene::remodelling::bond_based::{BondBasedParams, CENTRAL, Case, Micromodulus, Start};
 use crate::scene::remodelling::marcher::{Marcher, Model, Stage};
 use crate::scene::setting::{Inputs, Setting};
 
@@ -29,7 +29,11 @@ impl BondBasedParams {
         let key = |name: &str| format!("physics.bond-based.{name}");
         if !(self.young.is_finite() && self.young > 0.0) {
             let found = format!("found {}", self.young);
-            return Err(Error::setting(key("young"), found, "give a positive modulus"));
+            return Err(Error::setting(
+                key("young"),
+                found,
+                "give a positive modulus",
+            ));
         }
         if !(-0.99..=CENTRAL + NEAR).contains(&self.poisson) {
             return Err(Error::setting(
@@ -46,7 +50,9 @@ impl BondBasedParams {
             }
             Micromodulus::Finite(e) => Err(Error::setting(
                 key("micromodulus.finite"),
-                format!("found {e} beside poisson or cases, for which no fit at finite strain is known"),
+                format!(
+                    "found {e} beside poisson or cases, for which no fit at finite strain is known"
+                ),
                 "take \"discrete\" or \"continuous\"",
             )),
         }
@@ -64,7 +70,11 @@ fn weights(cases: &[Case]) -> Result<Vec<f64>> {
         }
         if case.name.is_empty() || cases[..k].iter().any(|c| c.name == case.name) {
             let found = format!("found \"{}\"", case.name);
-            return Err(Error::setting(key("name"), found, "give each case a name of its own"));
+            return Err(Error::setting(
+                key("name"),
+                found,
+                "give each case a name of its own",
+            ));
         }
     }
     let sum: f64 = cases.iter().map(|c| c.weight).sum();

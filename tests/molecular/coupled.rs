@@ -165,8 +165,13 @@ fn a_breaking_strip_senses_its_strain() {
     let (plain, kept) = solved(&wired_strip(0.2));
     let bare = kept.column("potential_drop");
     let (_, zero) = with(0.0);
-    let pairs = zero.column("potential_drop").into_iter().zip(&bare);
-    pairs.for_each(|(a, b)| assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}"));
+    // Once the strip is through, the current has no path.
+    for (a, b) in zero.column("potential_drop").into_iter().zip(&bare) {
+        assert!(
+            (a / b - 1.0).abs() < 1e-9 || (a.is_nan() && b.is_nan()),
+            "{a} {b}"
+        );
+    }
     let (sensing, kept) = with(-2.0);
     let strained = kept.column("potential_drop");
     assert!((strained[0] / bare[0] - 1.0).abs() < 1e-9);

@@ -1,5 +1,7 @@
 //! Owns the table `[physics.continuum-molecular]` as it stands in a scene file: which tables and keys go together.
 
+mod coupled;
+
 use super::{
     Bending, Conduction, Elasticity, Fracture, FromScan, Known, Material, Molecular, Problem,
     Steady, TetrachiralParams, Thermal, Transient, Vibration, sweep,
@@ -123,7 +125,7 @@ fn elastic(
     let thermal = file.thermal.take();
     let elasticity = file.elasticity()?;
     let Some(fracture) = fracture else {
-        coupled(thermal.as_ref(), conduction.as_ref())?;
+        coupled::check(thermal.as_ref(), conduction.as_ref())?;
         return Ok(Problem::Static {
             elasticity,
             thermal,
@@ -149,45 +151,6 @@ fn elastic(
         fracture,
         conduction: conduction.map(ConductionFile::steady).transpose()?,
     })
-}
-
-/// # Errors
-/// Elasticity and conduction that do not act on each other, or both ways at a time; a rise of temperature from nowhere, or twice.
-fn coupled(thermal: Option<&Thermal>, conduction: Option<&ConductionFile>) -> Result<()> {
-    if thermal.is_some_and(|t| t.rise.is_some() && t.reference.is_some()) {
-        return refuse(
-            "elasticity.thermal.reference",
-            "a reference temperature beside a rise, which is one above it",
-            OUT,
-        );
-    }
-    let is_warmed = thermal.is_some_and(|t| t.rise.is_none());
-    let Some(conduction) = conduction else {
-        return match is_warmed {
-            false => Ok(()),
-            true => refuse(
-                "elasticity.thermal.rise",
-                "no temperature rise, and no conduction to take it from",
-                "give rise = [T0, dT/dx, dT/dy], or the table of conduction",
-            ),
-        };
-    };
-    if conduction.capacity.is_some() {
-        return refuse(
-            "conduction.capacity",
-            "a heat capacity with elasticity, where temperature and potential are steady",
-            OUT,
-        );
-    }
-    match (is_warmed, conduction.piezoresistance.is_some()) {
-        (false, false) => refuse_conduction(true),
-        (true, true) => refuse(
-            "conduction.piezoresistance",
-            "one conduction for the temperature of elasticity.thermal and for a potential that strain changes",
-            "leave one of them out, or give elasticity.thermal.rise",
-        ),
-        _ => Ok(()),
-    }
 }
 
 fn vibrating(file: ElasticityFile, vibration: Vibration, conducts: bool) -> Result<Problem> {

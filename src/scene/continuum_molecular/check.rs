@@ -5,7 +5,7 @@ mod components;
 mod numbers;
 mod unused;
 
-use super::conduction::CONDUCTED;
+use super::path::CONDUCTED;
 use super::setup::{Conductor, Setup};
 use super::solid::{DISPLACEMENT, Solid};
 use super::steady::loads;

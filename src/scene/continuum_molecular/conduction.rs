@@ -1,7 +1,7 @@
 //! Owns conduction of heat and of charge: steady, transient, and through a body whose bonds break.
 
 use super::equilibrium::{Factorised, factorise, right_hand_side, solve};
-use super::path::isolated;
+use super::path::{CONDUCTED, STEADY, drop, isolated};
 use super::setup::{Conductor, Setup};
 use super::steady::{loads, scalar, summary};
 use super::{Molecular, Steady, Transient};
@@ -11,11 +11,6 @@ use crate::physics::continuum_molecular::body::Body;
 use crate::scene::conditions::Time;
 use crate::scene::frame::{Field, Frame, Observer, Summary, Values};
 use crate::scene::setting::Setting;
-
-pub const CONDUCTED: [&[&str]; 1] = [&["temperature", "potential"]];
-
-/// Time at which schedules of a steady scene are read.
-pub const STEADY: f64 = 1.0;
 
 /// Steady conduction.
 pub fn steady(
@@ -102,12 +97,6 @@ fn conducted(
         numbers,
         fields,
     }
-}
-
-/// Difference of potential between two probes.
-pub fn drop(setup: &Setup, probes: [[f64; 2]; 2], values: &[f64]) -> f64 {
-    let at = |x| setup.points.nearest(x).map_or(0.0, |p| values[p]);
-    at(probes[0]) - at(probes[1])
 }
 
 /// Heat flux from the bonds to warmer points only, each counted in full (eq. 170 with its sign).

@@ -4,8 +4,8 @@
 use crate::error::{Error, Result};
 use crate::physics::continuum_molecular::body::Body;
 use crate::physics::continuum_molecular::piezoresistance::Piezoresistance;
-use crate::scene::continuum_molecular::conduction::{CONDUCTED, STEADY, drop};
 use crate::scene::continuum_molecular::equilibrium::solve;
+use crate::scene::continuum_molecular::path::{CONDUCTED, STEADY, drop};
 use crate::scene::continuum_molecular::setup::{Conductor, Setup};
 use crate::scene::continuum_molecular::solid::{Solid, Warm};
 use crate::scene::continuum_molecular::steady::{loads, scalar};

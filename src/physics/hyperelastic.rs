@@ -150,11 +150,9 @@ fn shear_bonds(directions: &[([f64; 2], [f64; 2])], f: &Plane) -> Response {
         let t = [-u[1] / length, u[0] / length];
         let gamma = angle(n) - turned;
         sum.energy += b * gamma * gamma;
-        for i in 0..2 {
-            for j in 0..2 {
-                sum.stress[i][j] += 2.0 * b * gamma * t[i] * n[j];
-                give[i][j] += 2.0 * b * t[i] * n[j];
-            }
+        for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            sum.stress[i][j] += 2.0 * b * gamma * t[i] * n[j];
+            give[i][j] += 2.0 * b * t[i] * n[j];
         }
         for (i, j, k, l) in indices() {
             let bent = (t[i] * u[k] + u[i] * t[k]) / length;

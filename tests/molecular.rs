@@ -4,6 +4,7 @@ mod bond_laws;
 mod breaking;
 mod costs;
 mod couple_stress;
+mod coupled;
 mod differences;
 mod fields;
 mod heat;

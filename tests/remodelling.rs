@@ -6,5 +6,6 @@ mod forces;
 mod horizons;
 mod limits;
 mod local;
+mod shear;
 mod square;
 mod tangent;

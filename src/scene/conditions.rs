@@ -169,6 +169,9 @@ pub struct Load {
     pub region: Region,
     pub component: String,
     pub value: Schedule,
+    /// The load case that it belongs to, where the physics has several; absent: all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub case: Option<String>,
 }
 
 fn zero() -> Schedule {

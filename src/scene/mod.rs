@@ -13,13 +13,14 @@ use crate::discretisation::plane::Points;
 use crate::discretisation::plane::geometry::Geometry;
 use crate::error::{ADVICE, Error, Result};
 use crate::physics::bond_based::BondBased;
+use crate::physics::bond_based::shear::ShearBonds;
 use conditions::{Hold, Layers, Load, Time};
 use continuum_molecular::Molecular;
 use frame::{Observer, Output, Summary};
 use remodelling::bond_based::BondBasedParams;
 use remodelling::continuum::{ContinuumParams, Local};
 use remodelling::marcher::Marcher;
-use remodelling::{bond_based, continuum, time_loop};
+use remodelling::{bond_based, continuum, shear_bonds, time_loop};
 use serde::{Deserialize, Serialize};
 use setting::{GridParams, Inputs, Probe, Setting};
 use std::path::Path;
@@ -137,6 +138,7 @@ pub struct Checked<'a> {
 /// What a scene's physics sets up.
 enum Model<'a> {
     BondBased(Box<Marcher<BondBased>>),
+    ShearBonds(Box<Marcher<ShearBonds>>),
     Continuum(Box<Marcher<Local>>),
     ContinuumMolecular(Box<continuum_molecular::check::Checked<'a>>),
 }
@@ -147,6 +149,11 @@ pub fn check<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Result<Checked<'a>> {
     let setting = &scene.setting;
     setting.output.check()?;
     let model = match &scene.physics {
+        Physics::BondBased(params) if params.is_extended() => {
+            let marcher = shear_bonds::marcher(setting, params, inputs)?;
+            time_loop::check(setting)?;
+            Model::ShearBonds(Box::new(marcher))
+        }
         Physics::BondBased(params) => {
             let marcher = bond_based::marcher(setting, params, inputs)?;
             time_loop::check(setting)?;
@@ -180,6 +187,7 @@ impl Checked<'_> {
         let (setting, inputs) = (&self.scene.setting, self.inputs);
         match self.model {
             Model::BondBased(marcher) => time_loop::run(*marcher, setting, inputs, observer),
+            Model::ShearBonds(marcher) => time_loop::run(*marcher, setting, inputs, observer),
             Model::Continuum(marcher) => time_loop::run(*marcher, setting, inputs, observer),
             Model::ContinuumMolecular(checked) => checked.run(observer),
         }

@@ -74,15 +74,3 @@ fn bone_under_a_constant_force_settles_by_the_closed_form() {
         assert!(near, "{found:?} {expected:?}");
     }
 }
-
-/// Bonds beyond the surface are missing: a force on a point of it has no meaning of its own in the limit.
-#[test]
-fn forces_on_bonds_are_refused_with_what_to_do() {
-    let text = pulled(0.01, "").replace("nodal = true", "nodal = false");
-    let text = text
-        .replace("continuum", "bond-based")
-        .replace("poisson = 0.3", "")
-        .replace("spacing = 0.1", "spacing = 0.1\n horizon_ratio = 2.01");
-    let words = simulate(&text).map(|_| ()).unwrap_err().to_string();
-    assert!(words.contains("driven by displacements"), "{words}");
-}

@@ -98,13 +98,14 @@ impl Toy {
             given: &self.given,
             old: &self.old,
             dt: 0.1,
+            load: &[],
         }
     }
 }
 
 /// Largest deviation of the tangent from central differences in each of the four blocks, relative to the block's
 /// largest entry.
-fn tangent_errors(step: &impl Staggered, pattern: Sparse, q: &[f64]) -> [f64; 4] {
+pub fn tangent_errors(step: &impl Staggered, pattern: Sparse, q: &[f64]) -> [f64; 4] {
     let (n, local, h) = (q.len(), step.local(), 1e-6);
     let mut k = pattern;
     step.tangent(q, &mut k);

@@ -55,6 +55,18 @@ fn differences_to_another_scene_are_those_of_the_fields() {
         "{row:?}"
     );
 
+    let pearson = {
+        let centred = |v: &[([f64; 2], f64)]| -> Vec<f64> {
+            let mean = v.iter().map(|(_, v)| v).sum::<f64>() / n;
+            v.iter().map(|(_, v)| v - mean).collect()
+        };
+        let (a, b) = (centred(&bonds), centred(&local));
+        let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt()
+    };
+    assert!(table.lines().next().unwrap().ends_with(",correlation"));
+    assert!(near(row[7], pearson) && pearson < 1.0, "{row:?} {pearson}");
+
     let cell = |p: &[f64; 2]| p.map(|v| (v - 0.5).round() as i32);
     let body = Points::from_cells([0.0; 2], 1.0, bonds.iter().map(|(p, _)| cell(p)).collect());
     let range = map::Range {

@@ -6,6 +6,7 @@ use crate::draw::map::Range;
 use crate::error::{Error, Result};
 use crate::export::points as files;
 use crate::io::atomic;
+use crate::result::statistics::regression::regression;
 use std::path::{Path, PathBuf};
 
 /// Scalar fields by name.
@@ -78,8 +79,9 @@ pub fn write(
     points: &Points,
     other: &Other,
 ) -> Result<Option<String>> {
-    let mut rows =
-        vec!["t,mean,mean_abs,p95_abs,max_abs,share_above_0.1,share_above_0.3".to_owned()];
+    let mut rows = vec![
+        "t,mean,mean_abs,p95_abs,max_abs,share_above_0.1,share_above_0.3,correlation".to_owned(),
+    ];
     let mut missing = Vec::new();
     for (t, scalars) in maps {
         let Some((name, values)) = scalars.first() else {
@@ -90,8 +92,10 @@ pub fn write(
             continue;
         };
         let minus = files::read_column(file, name)?;
-        let change: Vec<f64> = values.iter().zip(&minus).map(|(a, (_, b))| a - b).collect();
-        rows.push(difference_row(*t, &change));
+        let minus: Vec<f64> = minus.into_iter().map(|(_, v)| v).collect();
+        let change: Vec<f64> = values.iter().zip(&minus).map(|(a, b)| a - b).collect();
+        let alike = correlation(values, &minus);
+        rows.push(format!("{},{alike}", difference_row(*t, &change)));
         let range = Range {
             low: -0.3,
             high: 0.3,
@@ -109,7 +113,13 @@ pub fn write(
     }))
 }
 
-/// A line of `difference.csv`.
+/// Pearson's correlation of two maps: how alike they are but for a level and a scale. No number where a map does not vary.
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let fit = regression(b, a);
+    fit.map_or(f64::NAN, |fit| fit.r2.sqrt().copysign(fit.slope))
+}
+
+/// A line of `difference.csv` but for the correlation.
 fn difference_row(t: f64, change: &[f64]) -> String {
     let n = change.len() as f64;
     let mut size: Vec<f64> = change.iter().map(|v| v.abs()).collect();
@@ -124,4 +134,18 @@ fn difference_row(t: f64, change: &[f64]) -> String {
         above(0.1),
         above(0.3)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::correlation;
+
+    /// By hand: deviations -1, 0, 1 and 1, -2, 1 of [1, 2, 3] and [4, 1, 4] have no product; level and scale do not matter.
+    #[test]
+    fn correlations_of_maps() {
+        assert!(correlation(&[1.0, 2.0, 3.0], &[4.0, 1.0, 4.0]).abs() < 1e-12);
+        assert!((correlation(&[1.0, 2.0, 4.0], &[12.0, 14.0, 18.0]) - 1.0).abs() < 1e-12);
+        assert!((correlation(&[1.0, 2.0, 4.0], &[-1.0, -2.0, -4.0]) + 1.0).abs() < 1e-12);
+        assert!(correlation(&[1.0, 2.0, 3.0], &[5.0, 5.0, 5.0]).is_nan());
+    }
 }

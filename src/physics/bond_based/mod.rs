@@ -6,6 +6,7 @@
 //! equations; fictitious ones follow or are held.
 
 mod kernel;
+pub mod shear;
 
 use crate::discretisation::plane::Points;
 use crate::discretisation::plane::family::{Bond, Family, Stencil};
@@ -62,6 +63,8 @@ pub struct Step<'a> {
     /// Densities of the material points before the step.
     pub old: &'a [f64],
     pub dt: f64,
+    /// Force on each value (placements only); empty: none.
+    pub load: &'a [f64],
 }
 
 /// A bond seen from one end.
@@ -177,7 +180,7 @@ impl Step<'_> {
         let model = self.model;
         let PointState { energy, force, .. } = states[model.point_of(value)];
         match (value.checked_sub(model.points), &model.growth) {
-            (Some(place), _) => force[place % 2],
+            (Some(place), _) => force[place % 2] + self.load_at(value, place / 2),
             (None, Some(growth)) => {
                 growth
                     .balance(values[value], self.old[value], energy, self.dt)
@@ -185,6 +188,13 @@ impl Step<'_> {
             }
             (None, None) => 0.0,
         }
+    }
+
+    /// Force density of the load on a value of point `a`.
+    fn load_at(&self, value: usize, a: usize) -> f64 {
+        let share = self.model.shares.as_ref().map_or(1.0, |s| s[a]);
+        let cell = share * self.model.family.stencil.spacing.powi(2);
+        self.load.get(value).map_or(0.0, |f| f / cell)
     }
 
     /// Row of a density's equation (eqs A1 and A2).

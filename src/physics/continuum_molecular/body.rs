@@ -64,6 +64,19 @@ impl<const D: usize> Body<D> {
         }
     }
 
+    /// Multiplies every listed bond by `by` of its place in the list, its two points and its kind; both places of a bond must get
+    /// the same.
+    pub fn scale_each(&mut self, mut by: impl FnMut(usize, usize, usize, usize) -> f64) {
+        let mut factor = Vec::with_capacity(self.family.len());
+        for p in 0..self.family.rows() {
+            for slot in self.family.range(p) {
+                let (q, kind) = self.family.kind(slot);
+                factor.push(self.factor(slot) * by(slot, p, q, kind));
+            }
+        }
+        self.factor = factor;
+    }
+
     /// Values stored to tell the bonds of this body apart.
     pub fn bond_values(&self) -> usize {
         self.factor.len()

@@ -13,6 +13,7 @@ pub mod cosine;
 pub mod crack_tip;
 pub mod elastic_law;
 pub mod micromoduli;
+pub mod piezoresistance;
 pub mod small;
 pub mod tensor;
 pub mod tetrachiral;

@@ -5,7 +5,7 @@ mod components;
 mod numbers;
 mod unused;
 
-use super::conduction::CONDUCTED;
+use super::path::CONDUCTED;
 use super::setup::{Conductor, Setup};
 use super::solid::{DISPLACEMENT, Solid};
 use super::steady::difference::DIFFERENCE;
@@ -197,9 +197,13 @@ fn always(model: &Molecular, turns: bool) -> Vec<&'static str> {
         } => vec!["damage"],
         Problem::Fracture { .. } => vec!["damage", "potential"],
         Problem::Vibration { .. } => vec!["magnitude"],
-        Problem::Static { .. } => {
-            let rotation = turns.then_some("rotation");
-            rotation.into_iter().chain(STATIC).collect()
+        Problem::Static { conduction, .. } => {
+            let turned = turns.then_some("rotation");
+            let coupled = conduction.as_ref().map(|c| match c.piezoresistance {
+                Some(_) => "potential",
+                None => "temperature",
+            });
+            turned.into_iter().chain(STATIC).chain(coupled).collect()
         }
     }
 }

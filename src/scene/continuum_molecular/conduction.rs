@@ -1,7 +1,7 @@
 //! Owns conduction of heat and of charge: steady, transient, and through a body whose bonds break.
 
 use super::equilibrium::{Factorised, factorise, right_hand_side, solve};
-use super::path::isolated;
+use super::path::{CONDUCTED, STEADY, drop, isolated};
 use super::setup::{Conductor, Setup};
 use super::steady::difference::{DIFFERENCE, Difference, at_points, difference};
 use super::steady::{loads, scalar, summary};
@@ -12,11 +12,6 @@ use crate::physics::continuum_molecular::body::Body;
 use crate::scene::conditions::Time;
 use crate::scene::frame::{Field, Frame, Observer, Summary, Values};
 use crate::scene::setting::Setting;
-
-pub const CONDUCTED: [&[&str]; 1] = [&["temperature", "potential"]];
-
-/// Time at which schedules of a steady scene are read.
-const STEADY: f64 = 1.0;
 
 /// Steady conduction.
 pub fn steady(
@@ -122,12 +117,6 @@ fn known_flux(model: &Molecular, steady: &Steady, setup: &Setup) -> Result<Vec<[
         [-(k11 * dx + k12 * dy), -(k12 * dx + k22 * dy)]
     };
     Ok((0..setup.points.len()).map(at).collect())
-}
-
-/// Difference of potential between two probes.
-pub fn drop(setup: &Setup, probes: [[f64; 2]; 2], values: &[f64]) -> f64 {
-    let at = |x| setup.points.nearest(x).map_or(0.0, |p| values[p]);
-    at(probes[0]) - at(probes[1])
 }
 
 /// Heat flux from the bonds to warmer points only, each counted in full (eq. 170 with its sign).

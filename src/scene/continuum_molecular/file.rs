@@ -1,5 +1,7 @@
 //! Owns the table `[physics.continuum-molecular]` as it stands in a scene file: which tables and keys go together.
 
+mod coupled;
+
 use super::{
     Bending, Conduction, Elasticity, Fracture, FromScan, Known, Material, Molecular, Problem,
     Steady, TetrachiralParams, Thermal, Transient, Vibration, sweep,
@@ -71,6 +73,9 @@ struct ConductionFile {
     initial: Option<f64>,
     #[serde(default)]
     probes: Option<[[f64; 2]; 2]>,
+    /// With elasticity.
+    #[serde(default)]
+    piezoresistance: Option<f64>,
 }
 
 fn one() -> f64 {
@@ -125,10 +130,11 @@ fn elastic(
     let thermal = file.thermal.take();
     let elasticity = file.elasticity()?;
     let Some(fracture) = fracture else {
-        refuse_conduction(conduction.is_some())?;
+        coupled::check(thermal.as_ref(), conduction.as_ref())?;
         return Ok(Problem::Static {
             elasticity,
             thermal,
+            conduction: conduction.map(ConductionFile::steady).transpose()?,
         });
     };
     if thermal.is_some() {
@@ -172,8 +178,9 @@ fn refuse_conduction(conducts: bool) -> Result<()> {
         false => Ok(()),
         true => refuse(
             MODEL,
-            "elasticity and conduction without fracture, which do not act on each other",
-            "make two scenes, or add the table of fracture: broken bonds stop conducting",
+            "elasticity and conduction that do not act on each other",
+            "make two scenes, or couple them: fracture (broken bonds stop conducting), elasticity.thermal without rise (the \
+             temperature strains the body), or conduction.piezoresistance (strain changes what bonds conduct)",
         ),
     }
 }
@@ -186,6 +193,13 @@ fn conducting(file: Option<ConductionFile>) -> Result<Problem> {
             "add the table of at least one",
         );
     };
+    if file.piezoresistance.is_some() {
+        return refuse(
+            "conduction.piezoresistance",
+            "a change of conductivity with strain, but no elasticity",
+            "leave it out, or add the table of elasticity",
+        );
+    }
     let Some(capacity) = file.capacity else {
         return Ok(Problem::Steady(file.steady()?));
     };
@@ -256,6 +270,7 @@ impl ConductionFile {
         }
         Ok(Steady {
             probes: self.probes,
+            piezoresistance: self.piezoresistance,
             conduction: self.conduction(),
         })
     }
@@ -288,7 +303,9 @@ impl From<Molecular> for MolecularFile {
             Problem::Static {
                 elasticity,
                 thermal,
+                conduction,
             } => {
+                file.conduction = conduction.map(ConductionFile::from);
                 file.elasticity = Some(ElasticityFile {
                     thermal,
                     ..elasticity.into()
@@ -358,6 +375,7 @@ impl From<Conduction> for ConductionFile {
             capacity: None,
             initial: None,
             probes: None,
+            piezoresistance: None,
         }
     }
 }
@@ -366,6 +384,7 @@ impl From<Steady> for ConductionFile {
     fn from(steady: Steady) -> Self {
         ConductionFile {
             probes: steady.probes,
+            piezoresistance: steady.piezoresistance,
             ..steady.conduction.into()
         }
     }

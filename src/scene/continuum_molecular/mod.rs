@@ -51,10 +51,11 @@ pub struct Molecular {
 /// What is solved, with the physics that it needs and no other.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Problem {
-    /// Elastic equilibrium.
+    /// Elastic equilibrium. With conduction either its temperature strains the body, or strain changes what its bonds conduct.
     Static {
         elasticity: Elasticity,
         thermal: Option<Thermal>,
+        conduction: Option<Steady>,
     },
     /// Fracture under a growing load; broken bonds stop conducting, where the body conducts.
     Fracture {
@@ -77,6 +78,8 @@ pub struct Steady {
     pub conduction: Conduction,
     /// Two positions whose potential difference is recorded.
     pub probes: Option<[[f64; 2]; 2]>,
+    /// Π of k_e(s) = k_e0 (1 + Π s), of bodies that are strained.
+    pub piezoresistance: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -109,20 +112,25 @@ impl Problem {
 
     pub fn conduction(&self) -> Option<&Conduction> {
         match self {
-            Problem::Fracture { conduction, .. } => conduction.as_ref().map(|c| &c.conduction),
+            Problem::Static { conduction, .. } | Problem::Fracture { conduction, .. } => {
+                conduction.as_ref().map(|c| &c.conduction)
+            }
             Problem::Steady(steady) => Some(&steady.conduction),
             Problem::Transient(transient) => Some(&transient.conduction),
-            Problem::Static { .. } | Problem::Vibration { .. } => None,
+            Problem::Vibration { .. } => None,
         }
     }
 
     /// Turns the material's first axis to `angle_deg`.
     fn turn(&mut self, angle_deg: f64) {
         match self {
-            Problem::Static { elasticity, .. } | Problem::Vibration { elasticity, .. } => {
-                elasticity.angle_deg = angle_deg;
+            Problem::Vibration { elasticity, .. } => elasticity.angle_deg = angle_deg,
+            Problem::Static {
+                elasticity,
+                conduction,
+                ..
             }
-            Problem::Fracture {
+            | Problem::Fracture {
                 elasticity,
                 conduction,
                 ..
@@ -199,12 +207,16 @@ pub struct Bending {
     pub exponent: u32,
 }
 
-/// Thermal strain (eq. 176): expansion a11, a22, a12 per degree, temperature rise `[T0, dT/dx, dT/dy]`.
+/// Thermal strain (eq. 176): expansion a11, a22, a12 per degree. The temperature rise is `[T0, dT/dx, dT/dy]`, or that of the scene's
+/// conduction above `reference` (0 where it is left out).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thermal {
     pub expansion: [f64; 3],
-    pub rise: [f64; 3],
+    #[serde(default)]
+    pub rise: Option<[f64; 3]>,
+    #[serde(default)]
+    pub reference: Option<f64>,
 }
 
 /// Heat or electric conduction.
@@ -361,6 +373,6 @@ fn elastic<const D: usize>(
         Problem::Fracture { fracture, .. } => {
             fracture::run(scene, model, fracture, solid, conductor, setup, observer)
         }
-        _ => steady::deform(scene, model, solid, setup, observer),
+        _ => steady::deform(scene, model, solid, conductor, setup, observer),
     }
 }

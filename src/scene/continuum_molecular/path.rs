@@ -1,7 +1,20 @@
-//! Owns whether currents find a path through a body whose bonds break.
+//! Owns what all conduction shares: its components, the potential between probes, and whether currents find a path through a body whose
+//! bonds break.
 
+use super::setup::Setup;
 use crate::discretisation::plane::family::Family;
 use crate::parts;
+
+pub const CONDUCTED: [&[&str]; 1] = [&["temperature", "potential"]];
+
+/// Time at which schedules of a steady scene are read.
+pub const STEADY: f64 = 1.0;
+
+/// Difference of potential between two probes.
+pub fn drop(setup: &Setup, probes: [[f64; 2]; 2], values: &[f64]) -> f64 {
+    let at = |x| setup.points.nearest(x).map_or(0.0, |p| values[p]);
+    at(probes[0]) - at(probes[1])
+}
 
 /// Points of pieces, as intact bonds join them, that take up a current and nowhere hold a potential: theirs has no bound.
 /// `held` and `force` are by point, `broken` by listed bond.

@@ -1,7 +1,7 @@
 //! Owns an elastic body: the moduli of its bonds and what is held of it.
 
 use super::setup::Setup;
-use super::{Bending, Elasticity, Molecular, Problem, Thermal};
+use super::{Bending, Elasticity, Molecular, Problem};
 use crate::error::Result;
 use crate::physics::continuum_molecular::body::Body;
 use crate::physics::continuum_molecular::bond::{Bond, Deformation, Moduli};
@@ -18,7 +18,15 @@ pub struct Solid<const D: usize> {
     /// Of each bond of the stencil.
     pub moduli: Vec<Moduli>,
     pub held: Vec<Option<f64>>,
-    pub thermal: Option<Thermal>,
+    pub thermal: Option<Warm>,
+}
+
+/// What warms a body.
+pub struct Warm {
+    /// a11, a22, a12 per degree.
+    pub expansion: [f64; 3],
+    /// Temperature rise of each point.
+    pub rise: Vec<f64>,
 }
 
 pub const DISPLACEMENT: [&[&str]; 3] = [&["x"], &["y"], &["rotation"]];
@@ -71,7 +79,18 @@ impl<const D: usize> Solid<D> {
             moduli,
             held,
             thermal: match &model.problem {
-                Problem::Static { thermal, .. } => *thermal,
+                Problem::Static {
+                    thermal: Some(thermal),
+                    ..
+                } => thermal.rise.map(|rise| Warm {
+                    expansion: thermal.expansion,
+                    rise: setup
+                        .points
+                        .positions()
+                        .iter()
+                        .map(|x| linear(rise, *x))
+                        .collect(),
+                }),
                 _ => None,
             },
         })
@@ -79,14 +98,13 @@ impl<const D: usize> Solid<D> {
 
     /// Stretch and shear that bond `b` from `p` to `q` would have if it were free: the thermal strain of the mean
     /// temperature of its ends.
-    pub fn free_strain(&self, setup: &Setup, p: usize, q: usize, b: &Bond) -> [f64; 2] {
+    pub fn free_strain(&self, p: usize, q: usize, b: &Bond) -> [f64; 2] {
         let Some(thermal) = &self.thermal else {
             return [0.0; 2];
         };
         let [a11, a22, a12] = thermal.expansion;
         let [x, y] = b.n;
-        let mean = [p, q].map(|p| thermal.rise_at(setup.points.position(p)));
-        let mean = 0.5 * (mean[0] + mean[1]);
+        let mean = 0.5 * (thermal.rise[p] + thermal.rise[q]);
         [
             mean * (a11 * x * x + a22 * y * y + 2.0 * a12 * x * y),
             mean * (a12 * (x * x - y * y) + (a22 - a11) * x * y),
@@ -94,26 +112,17 @@ impl<const D: usize> Solid<D> {
     }
 
     /// What bond `b` from `p` to `q` carries: its deformation less the thermal one, s - αT (eq. 176).
-    pub fn strained(
-        &self,
-        setup: &Setup,
-        x: &[[f64; D]],
-        p: usize,
-        q: usize,
-        b: &Bond,
-    ) -> Deformation {
+    pub fn strained(&self, x: &[[f64; D]], p: usize, q: usize, b: &Bond) -> Deformation {
         let mut d = b.deformation(&x[p], &x[q]);
-        let [stretch, shear] = self.free_strain(setup, p, q, b);
+        let [stretch, shear] = self.free_strain(p, q, b);
         (d.stretch, d.shear) = (d.stretch - stretch, d.shear - shear);
         d
     }
 }
 
-impl Thermal {
-    /// Temperature rise at `x`.
-    pub fn rise_at(&self, x: [f64; 2]) -> f64 {
-        self.rise[0] + self.rise[1] * x[0] + self.rise[2] * x[1]
-    }
+/// A temperature rise `[T0, dT/dx, dT/dy]` at `x`.
+fn linear(rise: [f64; 3], x: [f64; 2]) -> f64 {
+    rise[0] + rise[1] * x[0] + rise[2] * x[1]
 }
 
 /// k_b of each bond: E = (δ³/6) ∫ k_b n nᵀ dψ, of which eqs. 180, 181 are the case n = 2; calibrated,

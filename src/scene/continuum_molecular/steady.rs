@@ -1,11 +1,12 @@
 //! Owns solutions of elastic bodies without cracks that grow, and what all solutions report.
 
+pub mod coupled;
 pub mod difference;
 mod section;
 
 use super::Molecular;
 use super::equilibrium::solve;
-use super::setup::Setup;
+use super::setup::{Conductor, Setup};
 use super::solid::Solid;
 use crate::error::Result;
 use crate::scene::frame::{Field, Frame, Observer, Summary, Values};
@@ -21,7 +22,7 @@ pub fn thermal_force<const D: usize>(solid: &Solid<D>, setup: &Setup) -> Vec<[f6
         for (q, kind, factor) in solid.body.row(p) {
             let (b, k) = (&setup.bonds[kind], &solid.moduli[kind]);
             let [x, y] = b.n;
-            let [stretch, shear] = solid.free_strain(setup, p, q, b);
+            let [stretch, shear] = solid.free_strain(p, q, b);
             let weight = factor * b.volume_mm2 * setup.cell;
             let (axial, lateral) = (weight * k.axial * stretch, weight * k.shear * shear);
             force[0] -= axial * x - lateral * y;
@@ -75,13 +76,15 @@ pub fn displacement<const D: usize>(x: &[[f64; D]], scale: f64) -> Field {
 pub fn deform<const D: usize>(
     scene: &Setting,
     model: &Molecular,
-    solid: Solid<D>,
+    mut solid: Solid<D>,
+    conductor: Option<Conductor>,
     setup: &Setup,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     observer.start(&setup.points, 1)?;
     let names: [&[&str]; D] = std::array::from_fn(|d| super::solid::DISPLACEMENT[d]);
     let t = scene.time.as_ref().map_or(1.0, |time| time.end);
+    let heat = coupled::warm(scene, model, setup, &mut solid, conductor.as_ref())?;
     let mut force = loads(scene, model, setup, names, t)?;
     if solid.thermal.is_some() {
         for (f, extra) in force.iter_mut().zip(thermal_force(&solid, setup)) {
@@ -98,7 +101,7 @@ pub fn deform<const D: usize>(
     }
     if let Some([e11, e22, shear]) = strain_of(model) {
         let [a11, a22, a12] = match (&solid.thermal, middle) {
-            (Some(t), Some(p)) => t.expansion.map(|a| a * t.rise_at(setup.points.position(p))),
+            (Some(t), Some(p)) => t.expansion.map(|a| a * t.rise[p]),
             _ => [0.0; 3],
         };
         let exact = solid
@@ -126,12 +129,18 @@ pub fn deform<const D: usize>(
     fields.push(scalar("section_xx", component(&sections.normal_x, 0)));
     fields.push(scalar("section_yy", component(&sections.normal_y, 1)));
     fields.push(scalar("section_xy", component(&sections.normal_y, 0)));
+    let current = coupled::sense(scene, model, setup, (&solid, &x), conductor.as_ref())?;
+    let mut stored = solid.body.bond_values();
+    for added in [heat, current] {
+        numbers.extend(added.numbers);
+        fields.extend(added.fields);
+        stored += added.bond_values;
+    }
     observer.frame(&Frame {
         time: t,
         numbers: numbers.clone(),
         fields,
     })?;
-    let stored = solid.body.bond_values();
     Ok(summary(setup, unknowns, stored, 1, numbers))
 }
 
@@ -158,7 +167,7 @@ fn energy_density<const D: usize>(solid: &Solid<D>, setup: &Setup, x: &[[f64; D]
             .row(p)
             .map(|(q, kind, factor)| {
                 let b = &setup.bonds[kind];
-                let w = b.energy(&solid.moduli[kind], &solid.strained(setup, x, p, q, b));
+                let w = b.energy(&solid.moduli[kind], &solid.strained(x, p, q, b));
                 0.5 * factor * w * b.volume_mm2
             })
             .sum()
@@ -173,7 +182,7 @@ pub fn stress<const D: usize>(solid: &Solid<D>, setup: &Setup, x: &[[f64; D]]) -
         let mut s = [0.0; 3];
         for (q, kind, factor) in solid.body.row(p) {
             let (b, k) = (&setup.bonds[kind], &solid.moduli[kind]);
-            let d = solid.strained(setup, x, p, q, b);
+            let d = solid.strained(x, p, q, b);
             let weight = 0.5 * factor * b.volume_mm2 * b.length_mm;
             let (axial, lateral) = (weight * k.axial * d.stretch, weight * k.shear * d.shear);
             let [nx, ny] = b.n;

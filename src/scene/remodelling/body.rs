@@ -9,7 +9,8 @@ use crate::error::{Error, Result};
 use crate::operator::reduction::{Reduction, Value};
 use crate::scene::conditions::{Hold, Lateral, LayerDensity, Layers};
 
-/// Points with their conditions. Values are densities first (point `p`), then placements (`points + 2p + axis`).
+/// Points with their conditions. Values are densities first (point `p`), then placements (`points + 2p + axis`); where points turn,
+/// their rotations follow, and where there are several load cases, the placements and rotations of each.
 pub struct Body {
     /// Material points, then fictitious ones.
     pub points: Points,
@@ -24,8 +25,29 @@ pub struct Body {
     /// Centre and size of the material along each axis.
     extents: [(f64, f64); 2],
     holds: Vec<Hold>,
+    motion: Motion,
     /// Initial density of every point.
     density: Vec<f64>,
+}
+
+/// Values of a body beside its densities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Motion {
+    pub cases: usize,
+    /// Whether points have rotations.
+    pub turns: bool,
+}
+
+impl Motion {
+    pub const PLAIN: Motion = Motion {
+        cases: 1,
+        turns: false,
+    };
+
+    /// Values of one case.
+    fn stride(self, points: usize) -> usize {
+        points * if self.turns { 3 } else { 2 }
+    }
 }
 
 /// What a body is made from.
@@ -39,6 +61,7 @@ pub struct Conditions<'a> {
     pub reference_density: f64,
     /// Whether densities are unknowns.
     pub grows: bool,
+    pub motion: Motion,
 }
 
 impl Body {
@@ -70,6 +93,7 @@ impl Body {
             on_edge: Vec::new(),
             extents: [(0.0, 0.0); 2],
             holds: conditions.holds.to_vec(),
+            motion: conditions.motion,
             density,
             points,
         };
@@ -89,7 +113,10 @@ impl Body {
             hold.value.check(&format!("hold[{k}].value"))?;
             let axis = axis_of(&hold.component, &format!("hold[{k}].component"))?;
             for p in hold.region.select(material, material.len(), &key)? {
-                held.push((self.placement(p, axis), self.points.position(p)[axis], k));
+                for case in self.cases() {
+                    let value = self.placement_in(case, p, axis);
+                    held.push((value, self.points.position(p)[axis], k));
+                }
             }
         }
         Ok(held)
@@ -115,8 +142,15 @@ impl Body {
         let density = if grows { Value::Free } else { Value::Held };
         let mut roles = vec![density; self.material];
         roles.resize(self.points.len(), Value::Held);
-        roles.resize(self.points.len() + 2 * self.material, Value::Free);
-        roles.resize(3 * self.points.len(), Value::Held);
+        for case in self.cases() {
+            let first = self.placement_in(case, 0, 0);
+            roles.resize(first + 2 * self.material, Value::Free);
+            roles.resize(first + 2 * self.points.len(), Value::Held);
+            if self.motion.turns {
+                roles.resize(roles.len() + self.material, Value::Free);
+                roles.resize(first + 3 * self.points.len(), Value::Held);
+            }
+        }
         self.held
             .iter()
             .for_each(|&(value, _, _)| roles[value] = Value::Held);
@@ -124,7 +158,9 @@ impl Body {
             return roles;
         };
         for &(p, edge) in &self.on_edge {
-            roles[self.placement(p, edge.normal().0)] = Value::Held;
+            for case in self.cases() {
+                roles[self.placement_in(case, p, edge.normal().0)] = Value::Held;
+            }
         }
         for (k, f) in self.fictitious.iter().enumerate() {
             let p = self.material + k;
@@ -132,18 +168,40 @@ impl Body {
             if grows && layers.density == LayerDensity::Mirrored {
                 roles[p] = Value::Follows(f.mirrored);
             }
-            let leader = self.placement(f.mirrored, 1 - axis);
-            // A held leader's own coordinate is the follower's too: both are given.
-            if layers.lateral == Lateral::Mirrored && roles[leader] == Value::Free {
-                roles[self.placement(p, 1 - axis)] = Value::Follows(leader);
+            for case in self.cases() {
+                let leader = self.placement_in(case, f.mirrored, 1 - axis);
+                // A held leader's own coordinate is the follower's too: both are given.
+                if layers.lateral == Lateral::Mirrored && roles[leader] == Value::Free {
+                    roles[self.placement_in(case, p, 1 - axis)] = Value::Follows(leader);
+                }
             }
         }
         roles
     }
 
-    /// Place of a point's coordinate among the values.
+    /// Place of a point's coordinate among the values, in the first case.
     pub fn placement(&self, point: usize, axis: usize) -> usize {
-        self.points.len() + 2 * point + axis
+        self.placement_in(0, point, axis)
+    }
+
+    /// Place of a point's coordinate among the values of a case.
+    pub fn placement_in(&self, case: usize, point: usize, axis: usize) -> usize {
+        let n = self.points.len();
+        n + case * self.motion.stride(n) + 2 * point + axis
+    }
+
+    pub fn cases(&self) -> std::ops::Range<usize> {
+        0..self.motion.cases
+    }
+
+    /// The point of a value that is no density, and its axis; no axis: a rotation.
+    fn moved(&self, value: usize) -> Option<(usize, Option<usize>)> {
+        let n = self.points.len();
+        let place = value.checked_sub(n)? % self.motion.stride(n);
+        Some(match place.checked_sub(2 * n) {
+            None => (place / 2, Some(place % 2)),
+            Some(point) => (point, None),
+        })
     }
 
     /// Centre and size of the material along an axis.
@@ -186,15 +244,15 @@ impl Body {
         Some(share)
     }
 
-    /// Where each unknown from `first` on, a placement, sits at rest.
+    /// Where each unknown from `first` on, a placement or rotation, sits at rest.
     pub fn unknown_positions(&self, first: usize) -> Vec<[f64; 2]> {
-        let place = |q: usize| self.map.equation(q) - self.points.len();
         (first..self.map.unknowns())
-            .map(|q| self.points.position(place(q) / 2))
+            .filter_map(|q| self.moved(self.map.equation(q)))
+            .map(|(p, _)| self.points.position(p))
             .collect()
     }
 
-    /// Displacement of a point.
+    /// Displacement of a point in the first case.
     pub fn displacement(&self, values: &[f64], point: usize) -> [f64; 2] {
         let rest = self.points.position(point);
         [0, 1].map(|d| values[self.placement(point, d)] - rest[d])

@@ -1,14 +1,16 @@
 //! Owns scenes of bond-based peridynamics, with or without growth.
 
+use crate::discretisation::plane::family::Stencil;
 use crate::error::{Error, Result};
 use crate::operator::reduction::Reduction;
 use crate::operator::sparse::Sparse;
 use crate::physics::bond_based::{
     BondBased, Material, Step, micromodulus_continuous, micromodulus_discrete,
 };
-use crate::physics::growth::Weight;
-use crate::scene::remodelling::body::{Body, Conditions};
+use crate::physics::growth::{Growth, Weight};
+use crate::scene::remodelling::body::{Body, Conditions, Motion};
 use crate::scene::remodelling::density::{DensityParams, GrowthParams, Probes};
+use crate::scene::remodelling::loads::Loads;
 use crate::scene::remodelling::marcher::{Marcher, Model, Stage};
 use crate::scene::remodelling::solver::SolverParams;
 use crate::scene::setting::{Inputs, Setting};
@@ -18,8 +20,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BondBasedParams {
-    /// Young's modulus at the reference density. Poisson's ratio is 1/3 (plane stress).
+    /// Young's modulus at the reference density.
     pub young: f64,
+    /// Poisson's ratio in plane stress. Below 1/3, that of bonds under stretch alone, bonds resist shear too, and points turn.
+    #[serde(default = "third")]
+    pub poisson: f64,
+    /// Several load cases; the stimulus is the weighted mean of their energies. Absent: one.
+    #[serde(default)]
+    pub cases: Vec<Case>,
     #[serde(default)]
     pub micromodulus: Micromodulus,
     #[serde(default)]
@@ -29,6 +37,13 @@ pub struct BondBasedParams {
     pub growth: Option<GrowthParams>,
     #[serde(default)]
     pub solver: SolverParams,
+}
+
+/// Poisson's ratio of bonds that resist stretch alone, in plane stress.
+pub const CENTRAL: f64 = 1.0 / 3.0;
+
+fn third() -> f64 {
+    CENTRAL
 }
 
 /// Where the bond stiffness comes from.
@@ -44,54 +59,99 @@ pub enum Micromodulus {
     Finite(f64),
 }
 
+/// One of several load cases that act on the same densities.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// What its loads name.
+    pub name: String,
+    /// Its cycles, or its share of them: only ratios matter.
+    pub weight: f64,
+}
+
+/// What all models of bonds start from.
+pub(super) struct Start {
+    pub body: Body,
+    pub stencil: Stencil,
+    pub growth: Option<Growth>,
+    pub weight: Weight,
+    pub density: Vec<f64>,
+    pub probes: Probes,
+    pub loads: Option<Loads>,
+    pub shares: Option<Vec<f64>>,
+}
+
+impl Start {
+    /// # Errors
+    /// What a run would refuse before its first step.
+    pub fn new(
+        scene: &Setting,
+        params: &BondBasedParams,
+        inputs: &Inputs,
+        motion: Motion,
+    ) -> Result<Self> {
+        let stencil = scene.stencil()?;
+        let material = scene.points(inputs)?;
+        let growth = params
+            .growth
+            .as_ref()
+            .map(|g| g.checked(&params.density))
+            .transpose()?;
+        let density = params.density.initial(&material, inputs)?;
+        let conditions = Conditions {
+            layers: scene.layers.as_ref(),
+            reach: stencil.reach() as usize,
+            holds: &scene.hold,
+            density: density.clone(),
+            reference_density: params.density.reference,
+            grows: growth.is_some(),
+            motion,
+        };
+        let body = Body::new(material.clone(), conditions)?;
+        let names: Vec<&str> = params.cases.iter().map(|c| c.name.as_str()).collect();
+        let loads = match scene.load.is_empty() {
+            true => None,
+            false => Some(Loads::new(scene, &body, &names)?),
+        };
+        let shares = body.shares();
+        let areas = match &shares {
+            Some(shares) => shares[..body.material].to_vec(),
+            None => vec![1.0; body.material],
+        };
+        Ok(Start {
+            probes: Probes::new(&scene.probe, &material, areas)?,
+            weight: Weight {
+                reference: params.density.reference,
+                exponent: params.density.exponent,
+            },
+            body,
+            stencil,
+            growth,
+            density,
+            loads,
+            shares,
+        })
+    }
+}
+
 /// The body of a scene, at rest.
 pub fn marcher(
     scene: &Setting,
     params: &BondBasedParams,
     inputs: &Inputs,
 ) -> Result<Marcher<BondBased>> {
-    let stencil = scene.stencil()?;
-    let material = scene.points(inputs)?;
-    let growth = params
-        .growth
-        .as_ref()
-        .map(|g| g.checked(&params.density))
-        .transpose()?;
-    let density = params.density.initial(&material, inputs)?;
-    let conditions = Conditions {
-        layers: scene.layers.as_ref(),
-        reach: stencil.reach() as usize,
-        holds: &scene.hold,
-        density: density.clone(),
-        reference_density: params.density.reference,
-        grows: growth.is_some(),
-    };
-    if !scene.load.is_empty() {
-        return Err(Error::setting(
-            "load",
-            "bond-based scenes are driven by displacements",
-            "obtain displacements from the same scene under [physics.continuum], and prescribe them with [[hold]]",
-        ));
-    }
-    let body = Body::new(material.clone(), conditions)?;
-    let shares = body.shares();
-    let areas = match &shares {
-        Some(shares) => shares[..body.material].to_vec(),
-        None => vec![1.0; body.material],
-    };
-    let probes = Probes::new(&scene.probe, &material, areas)?;
+    let start = Start::new(scene, params, inputs, Motion::PLAIN)?;
     let substance = Material {
-        micromodulus: params.micromodulus.value(params.young, &stencil)?,
+        micromodulus: params.micromodulus.value(params.young, &start.stencil)?,
         young: params.young,
-        weight: Weight {
-            reference: params.density.reference,
-            exponent: params.density.exponent,
-        },
-        growth,
+        weight: start.weight,
+        growth: start.growth,
     };
+    let (body, stencil, shares) = (start.body, start.stencil, start.shares);
     let model = BondBased::new(&body.points, body.material, stencil, substance, shares);
     let horizon = model.family.stencil.horizon;
-    Marcher::new(body, model, density, probes, None, &params.solver, horizon)
+    let (density, probes, loads) = (start.density, start.probes, start.loads);
+    Marcher::new(body, model, density, probes, loads, &params.solver, horizon)
 }
 
 impl Model for BondBased {
@@ -104,6 +164,7 @@ impl Model for BondBased {
             given: of.given,
             old: of.old,
             dt: of.dt,
+            load: of.load,
         }
     }
 
@@ -129,11 +190,7 @@ impl Model for BondBased {
 }
 
 impl Micromodulus {
-    fn value(
-        self,
-        young: f64,
-        stencil: &crate::discretisation::plane::family::Stencil,
-    ) -> Result<f64> {
+    fn value(self, young: f64, stencil: &Stencil) -> Result<f64> {
         if !(young.is_finite() && young > 0.0) {
             return Err(Error::setting(
                 "physics.bond-based.young",

@@ -9,7 +9,7 @@ use crate::operator::reduction::Reduction;
 use crate::operator::sparse::Sparse;
 use crate::physics::continuum::{Continuum, Old, Step};
 use crate::physics::growth::Weight;
-use crate::scene::remodelling::body::{Body, Conditions};
+use crate::scene::remodelling::body::{Body, Conditions, Motion};
 use crate::scene::remodelling::density::Probes;
 use crate::scene::remodelling::loads::Loads;
 use crate::scene::remodelling::marcher::{Marcher, Model, Stage};
@@ -57,6 +57,7 @@ pub fn marcher(
         density: density.clone(),
         reference_density: params.density.reference,
         grows: growth.is_some() && at_nodes,
+        motion: Motion::PLAIN,
     };
     let body = Body::new(material, conditions)?;
     let own = match params.density_at {
@@ -66,7 +67,7 @@ pub fn marcher(
             model.elements.iter().flat_map(|c| [mean(c); 4]).collect()
         }
     };
-    let loads = Loads::new(scene, &body)?;
+    let loads = Loads::new(scene, &body, &[])?;
     let spacing = model.spacing;
     let model = Local {
         continuum: model,

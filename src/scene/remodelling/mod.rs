@@ -6,6 +6,7 @@ pub mod continuum;
 pub mod density;
 mod loads;
 pub mod marcher;
+pub mod shear_bonds;
 pub mod solver;
 mod step_size;
 pub mod time_loop;

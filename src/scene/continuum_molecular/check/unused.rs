@@ -40,6 +40,10 @@ fn of_other_scenes(scene: &Setting) -> Result<()> {
     if scene.layers.is_some() {
         return refuse("layers", "layers of fictitious points", OUT);
     }
+    if let Some(k) = scene.load.iter().position(|l| l.case.is_some()) {
+        let found = "a load case, of which this physics has one";
+        return refuse(format!("load[{k}].case"), found, OUT);
+    }
     if !scene.probe.is_empty() {
         return refuse("probe", "probes of densities", OUT);
     }

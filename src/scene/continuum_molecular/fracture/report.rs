@@ -3,8 +3,11 @@
 use super::{CrackGrowth, Ledger};
 use crate::error::Result;
 use crate::physics::continuum_molecular::body::Body;
+use crate::physics::continuum_molecular::piezoresistance::Piezoresistance;
 use crate::scene::continuum_molecular::Problem;
-use crate::scene::continuum_molecular::conduction::{drop, potential};
+use crate::scene::continuum_molecular::conduction::potential;
+use crate::scene::continuum_molecular::path::drop;
+use crate::scene::continuum_molecular::steady::coupled::strained;
 use crate::scene::continuum_molecular::steady::{displacement, scalar, summary};
 use crate::scene::frame::{Frame, Observer, Summary};
 
@@ -72,7 +75,12 @@ impl<const D: usize> CrackGrowth<'_, D> {
             } => steady.probes,
             _ => None,
         };
+        if accepted && self.piezoresistance().is_some() {
+            self.update_whole_body();
+        }
         if let Some(conductor) = self.conductor.as_ref().filter(|_| accepted) {
+            let strained = self.strained(conductor)?;
+            let conductor = strained.as_ref().unwrap_or(conductor);
             let (values, unknowns) = potential(
                 self.scene,
                 self.model,
@@ -112,6 +120,22 @@ impl<const D: usize> CrackGrowth<'_, D> {
             numbers,
             fields,
         })
+    }
+
+    fn piezoresistance(&self) -> Option<Piezoresistance> {
+        match &self.model.problem {
+            Problem::Fracture { conduction, .. } => conduction.as_ref()?.piezoresistance(),
+            _ => None,
+        }
+    }
+
+    /// The conductor as the load strains it, where its bonds are piezoresistive.
+    fn strained(&self, conductor: &Body<1>) -> Result<Option<Body<1>>> {
+        let Some(law) = self.piezoresistance() else {
+            return Ok(None);
+        };
+        let (x, scale, broken) = (&self.x, self.lambda, &self.broken);
+        strained(law, self.setup, &self.solid, x, scale, conductor, broken).map(Some)
     }
 
     pub fn summary(&self, steps: usize) -> Summary {

@@ -20,7 +20,7 @@ impl Body {
 
     /// `u` moves the layers; `by` is the displacement of each hold.
     fn given_with(&self, u: f64, by: impl Fn(usize) -> f64) -> Vec<f64> {
-        let mut given = vec![0.0; 3 * self.points.len()];
+        let mut given = vec![0.0; self.map.values()];
         for (p, (given, density)) in given.iter_mut().zip(&self.density).enumerate() {
             if self.map.unknown(p).is_none() {
                 *given = *density;
@@ -34,22 +34,28 @@ impl Body {
         };
         for &(p, edge) in &self.on_edge {
             let (axis, sign) = edge.normal();
-            given[self.placement(p, axis)] = self.points.position(p)[axis] + sign as f64 * u;
+            for case in self.cases() {
+                given[self.placement_in(case, p, axis)] =
+                    self.points.position(p)[axis] + sign as f64 * u;
+            }
         }
         for (k, f) in self.fictitious.iter().enumerate() {
             let p = self.material + k;
             let (axis, sign) = f.edge.normal();
             let rest = self.points.position(p);
-            given[self.placement(p, axis)] = match layers.normal {
+            let moved = match layers.normal {
                 Normal::Affine => {
                     let (centre, size) = self.extents[axis];
                     centre + (rest[axis] - centre) * (1.0 + 2.0 * u / size)
                 }
                 Normal::Rigid => rest[axis] + sign as f64 * u,
             };
-            let lateral = self.placement(p, 1 - axis);
-            if self.map.unknown(lateral).is_none() {
-                given[lateral] = rest[1 - axis];
+            for case in self.cases() {
+                given[self.placement_in(case, p, axis)] = moved;
+                let lateral = self.placement_in(case, p, 1 - axis);
+                if self.map.unknown(lateral).is_none() {
+                    given[lateral] = rest[1 - axis];
+                }
             }
         }
         given
@@ -64,9 +70,10 @@ impl Body {
 
     /// Unknowns of the undeformed body.
     pub fn start(&self) -> Vec<f64> {
-        let at_rest = |value: usize| match value.checked_sub(self.points.len()) {
+        let at_rest = |value: usize| match self.moved(value) {
             None => self.density[value],
-            Some(place) => self.points.position(place / 2)[place % 2],
+            Some((p, Some(axis))) => self.points.position(p)[axis],
+            Some((_, None)) => 0.0,
         };
         (0..self.map.unknowns())
             .map(|q| at_rest(self.map.equation(q)))
@@ -86,9 +93,9 @@ impl Body {
         let along = (1.0 + 2.0 * u1 / size) / (1.0 + 2.0 * u0 / size);
         let across = 1.0 - 2.0 / 3.0 * (u1 - u0) / size;
         for (k, q) in q.iter_mut().enumerate() {
-            if let Some(place) = self.map.equation(k).checked_sub(self.points.len()) {
-                let centre = self.extents[place % 2].0;
-                let factor = if place % 2 == axis { along } else { across };
+            if let Some((_, Some(own))) = self.moved(self.map.equation(k)) {
+                let centre = self.extents[own].0;
+                let factor = if own == axis { along } else { across };
                 *q = centre + (*q - centre) * factor;
             }
         }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::physics::bond_based::micromodulus_discrete;
+use crate::physics::bond_based::shear::Micromoduli;
 use crate::physics::hyperelastic::Energy;
 use crate::scene::remodelling::density::{DensityParams, GrowthParams};
 use crate::scene::remodelling::solver::SolverParams;
@@ -14,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub struct ContinuumParams {
     /// Young's modulus at the reference density.
     pub young: f64,
-    /// For St. Venant-Kirchhoff; bonds have 1/3.
+    /// In plane stress. Bonds take up to 1/3; below, they resist shear.
     #[serde(default = "third")]
     pub poisson: f64,
     #[serde(default)]
@@ -40,6 +41,7 @@ fn third() -> f64 {
 pub enum EnergyLaw {
     #[default]
     StVenantKirchhoff,
+    NeoHooke,
     /// The local limit of peridynamics: harmonic bonds in all directions.
     IsotropicBonds,
     /// The local limit at fixed δ/Δ: harmonic bonds along the grid's stencil.
@@ -66,8 +68,34 @@ impl ContinuumParams {
                 "give a positive modulus and a plane-stress Poisson's ratio between -0.99 and 0.99",
             ));
         }
+        let is_of_bonds = matches!(
+            self.energy,
+            EnergyLaw::IsotropicBonds | EnergyLaw::StencilBonds
+        );
+        if is_of_bonds && self.poisson > third() {
+            return Err(Error::setting(
+                "physics.continuum.poisson",
+                format!("found {}, which no bonds have", self.poisson),
+                "give at most 1/3, or energy = \"st-venant-kirchhoff\" or \"neo-hooke\"",
+            ));
+        }
         Ok(match self.energy {
             EnergyLaw::StVenantKirchhoff => Energy::plane_stress(self.young, self.poisson),
+            EnergyLaw::NeoHooke => Energy::neo_hooke(self.young, self.poisson),
+            EnergyLaw::IsotropicBonds if self.poisson < third() => {
+                Energy::isotropic_shear_bonds(self.young, self.poisson)
+            }
+            EnergyLaw::StencilBonds if self.poisson < third() => {
+                let stencil = scene.stencil()?;
+                let c = Micromoduli::discrete(self.young, self.poisson, &stencil);
+                let quarter = 0.25 * stencil.spacing.powi(2);
+                let bond = |b: &crate::discretisation::plane::family::Bond| {
+                    let share = quarter * b.length * b.share;
+                    let n = b.xi.map(|v| v / b.length);
+                    (n, [share * c.axial, share * c.shear])
+                };
+                Energy::ShearBonds(stencil.bonds.iter().map(bond).collect())
+            }
             EnergyLaw::IsotropicBonds => Energy::isotropic_bonds(self.young),
             EnergyLaw::StencilBonds => {
                 let stencil = scene.stencil()?;

@@ -75,7 +75,7 @@ def cheapest(rows):
 
 
 def intact(rows):
-    """Bodies without gaps and cracks thinner than a voxel, beside voxels of a third of the same scans (reports/truth-set.csv)."""
+    """Bodies without gaps and cracks thinner than a voxel, with voxels of a third of the same scans (reports/truth-set.csv)."""
     truths = read(truth_set.REPORTS / "references.csv", lambda r: r["body"])
     with open(truth_set.REPORTS / "truth-set.csv") as file:
         thirds = {(r["body"], r["scan"]): r for r in csv.DictReader(file) if r["method"] == "voxel FE, refine 3"}

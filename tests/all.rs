@@ -54,6 +54,7 @@ mod stability;
 mod stiffness;
 mod stopping;
 mod stored;
+mod sub_volumes;
 mod tissue;
 mod voxel_fe;
 mod windows_text;

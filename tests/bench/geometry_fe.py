@@ -74,6 +74,23 @@ def cheapest(rows):
     return table(["scan", "target", *counts], lines)
 
 
+def intact(rows):
+    """Bodies without gaps and cracks thinner than a voxel, with voxels of a third of the same scans (reports/truth-set.csv)."""
+    truths = read(truth_set.REPORTS / "references.csv", lambda r: r["body"])
+    with open(truth_set.REPORTS / "truth-set.csv") as file:
+        thirds = {(r["body"], r["scan"]): r for r in csv.DictReader(file) if r["method"] == "voxel FE, refine 3"}
+    lines = []
+    for scan, against in (("clean", "body"), ("real", "image")):
+        for half in "ABC":
+            own = [r for r in rows if (r["scan"], r["half"]) == (scan, half) and not r["body"].startswith(("broken", "cracked"))]
+            far = [off(r, truths, f"e_{against}_mpa") for r in own]
+            fine = [off(thirds[r["body"], scan], truths, f"e_{against}_mpa") for r in own if (r["body"], scan) in thirds]
+            numbers = [f(values) for values in (far, fine) for f in (lambda v: f"{rms(v):.1f}", lambda v: f"{max(v, key=abs):+.1f}") if values]
+            if own:
+                lines.append([scan, against, half, str(len(own)), *numbers])
+    return table(["scan", "against the", "half", "bodies", "RMS %", "worst %", "voxels of a third: RMS %", "worst %"], lines)
+
+
 def draw():
     truths = read(truth_set.REPORTS / "references.csv", lambda r: r["body"])
     with open(ROWS) as file:
@@ -87,7 +104,7 @@ def draw():
             if own:
                 lines.append([scan, half, str(len({r["body"] for r in own})), *line(own, truths)])
     outside = [[r["body"], r["half"], r["scan"], f"{off(r, truths):+.1f}", f"{100 * number(r['error_mpa']) / number(r['e_app_mpa']):.1f}"] for r in rows if not within(r, truths)]
-    tables = {"errors": table(head, lines), "cheapest": cheapest(rows), "outside": table(["body", "half", "scan", "off %", "stated %"], outside)}
+    tables = {"errors": table(head, lines), "intact": intact(rows), "cheapest": cheapest(rows), "outside": table(["body", "half", "scan", "off %", "stated %"], outside)}
     text = PAGE.read_text()
     for key, words in tables.items():
         print(f"\n{words}")

@@ -297,7 +297,7 @@ mod tests {
             (
                 ",free,",
                 ",glued,",
-                "bonded, kinematic, mixed, symshear, found `glued`",
+                "bonded, kinematic, mixed, symshear, labels, found `glued`",
             ),
             ("NA,0,0.0", "1;2,0,0.0", "registration"),
             ("method", "methods", "missing field `method`"),

@@ -29,6 +29,7 @@ pub struct Recipe {
     pub loads: Vec<Load>,
     /// From the unit loads of `loads`: daily loads that bring the tissue nearest to this strain energy density (MPa; usual: 0.02)
     /// everywhere. None: they are not estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub in_vivo_mpa: Option<f64>,
     /// Table `[segment]`.
     pub segment: SegmentParams,
@@ -181,6 +182,7 @@ const TABLES: [&str; 3] = ["segment", "lattice", "solve"];
 /// All keys of a recipe.
 fn known() -> Value {
     let mut known = serde_json::to_value(Recipe::default()).expect("settings are plain data");
+    known["in_vivo_mpa"] = Value::Null;
     // Where they are not used they are left out.
     for key in [
         "plasticity",

@@ -77,7 +77,7 @@ pub struct InMemory {
     pub stiffness: Option<StiffnessRecord>,
 }
 
-/// Plane ends that touch less of the area that bone covers are uneven, or lie beside the bone.
+/// Plane ends that touch less of the area that bone covers are uneven, or lie next to the bone.
 const LEAST_TOUCHED: f64 = 0.05;
 
 /// A row with its fields, and whether it was kept from an earlier solve.

@@ -5,12 +5,14 @@ use crate::io::percent;
 use crate::measure::pistoia::Pistoia;
 use crate::physics::material::Material;
 use crate::physics::plasticity::Plasticity;
-use crate::pipeline::apparent::ends::label_image::LabelImage;
 use crate::pipeline::apparent::fields::Field;
 pub use crate::result::settings::by_label::{HeldLabel, MovedLabel, PushedLabel};
 pub use crate::result::settings::load_steps::LoadSteps;
 pub use crate::result::settings::{Conditions, Ends, Load, Method, Sed};
+use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use std::sync::Arc;
 
 /// What becomes of a block of voxels that one element covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
@@ -21,6 +23,45 @@ pub enum CoarsenBy {
     Threshold,
     /// An element whose modulus is that of bone times its bone fraction.
     Fraction,
+}
+
+/// A label image of the settings: its file, and its labels once they were read.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(from = "PathBuf", into = "PathBuf")]
+pub struct LabelImage {
+    /// The file.
+    pub path: PathBuf,
+    /// None before it was read.
+    pub laid: Option<Arc<Laid>>,
+}
+
+/// Labels on the voxels of a specimen.
+#[derive(Debug)]
+pub struct Laid {
+    /// Of the file.
+    pub blake3: String,
+    /// One a voxel of the specimen; 0 is none.
+    pub labels: Volume<i32>,
+}
+
+impl From<PathBuf> for LabelImage {
+    fn from(path: PathBuf) -> Self {
+        LabelImage { path, laid: None }
+    }
+}
+
+impl From<LabelImage> for PathBuf {
+    fn from(image: LabelImage) -> Self {
+        image.path
+    }
+}
+
+impl PartialEq for LabelImage {
+    /// The same file; of two that were read, with the same contents.
+    fn eq(&self, other: &Self) -> bool {
+        let read = self.laid.as_ref().zip(other.laid.as_ref());
+        self.path == other.path && read.is_none_or(|(a, b)| a.blake3 == b.blake3)
+    }
 }
 
 /// Settings of `solve`.

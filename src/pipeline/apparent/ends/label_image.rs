@@ -4,51 +4,10 @@ use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::mask::runs::Run;
 use crate::pipeline::apparent::params::SolveParams;
-use crate::volume::{Specimen, Volume};
-use serde::{Deserialize, Serialize};
+pub use crate::pipeline::apparent::params::{LabelImage, Laid};
+use crate::volume::Specimen;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
-use std::sync::Arc;
-
-/// A label image of the settings: its file, and its labels once they were read.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(from = "PathBuf", into = "PathBuf")]
-pub struct LabelImage {
-    /// The file.
-    pub path: PathBuf,
-    /// None before it was read.
-    pub laid: Option<Arc<Laid>>,
-}
-
-/// Labels on the voxels of a specimen.
-#[derive(Debug)]
-pub struct Laid {
-    /// Of the file.
-    pub blake3: String,
-    /// One a voxel of the specimen; 0 is none.
-    pub labels: Volume<i32>,
-}
-
-impl From<PathBuf> for LabelImage {
-    fn from(path: PathBuf) -> Self {
-        LabelImage { path, laid: None }
-    }
-}
-
-impl From<LabelImage> for PathBuf {
-    fn from(image: LabelImage) -> Self {
-        image.path
-    }
-}
-
-impl PartialEq for LabelImage {
-    /// The same file; of two that were read, with the same contents.
-    fn eq(&self, other: &Self) -> bool {
-        let read = self.laid.as_ref().zip(other.laid.as_ref());
-        self.path == other.path && read.is_none_or(|(a, b)| a.blake3 == b.blake3)
-    }
-}
 
 /// Labels by element of a model.
 pub struct LabelMap<'a> {

@@ -87,7 +87,7 @@ impl Gram {
         }
     }
 
-    /// Motions that none of the rows stops; shifts and turns about axes as far as they can be told apart.
+    /// Motions that none of the rows stops; shifts and turns about axes as far as they can be separated.
     pub fn free(&self) -> Vec<Motion> {
         let matrix = Mat::from_fn(6, 6, |i, j| self.0[i][j]);
         let Ok(eigen) = matrix.self_adjoint_eigen(Side::Lower) else {

@@ -5,8 +5,9 @@ pub mod built_in;
 use crate::error::{Error, Result};
 use crate::image::scan;
 use crate::io::percent;
+use crate::measure::load_history::MOST_LOADS;
 use crate::pipeline::apparent::checks::needs_modulus;
-use crate::pipeline::apparent::{Load, SolveParams};
+use crate::pipeline::apparent::{Load, Method, SolveParams};
 use crate::pipeline::lattice::LatticeParams;
 use crate::pipeline::segment::SegmentParams;
 use serde::{Deserialize, Serialize};
@@ -26,6 +27,10 @@ pub struct Recipe {
     pub error: Option<f64>,
     /// Loads of every scan, each a solve of its own with all else of `[solve]`; that of `[solve]` alone where there are none.
     pub loads: Vec<Load>,
+    /// From the unit loads of `loads`: daily loads that bring the tissue nearest to this strain energy density (MPa; usual: 0.02)
+    /// everywhere. None: they are not estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub in_vivo_mpa: Option<f64>,
     /// Table `[segment]`.
     pub segment: SegmentParams,
     /// Table `[lattice]`.
@@ -108,6 +113,7 @@ impl Recipe {
         }
         self.segment.check()?;
         self.lattice.check()?;
+        self.check_in_vivo()?;
         if self.loads.len() > 1 && !self.solve.fields.is_empty() {
             return Err(Error::setting(
                 "solve.fields",
@@ -121,6 +127,40 @@ impl Recipe {
             }
             solve.check()
         })
+    }
+
+    /// Refuses settings from which no daily loads follow.
+    fn check_in_vivo(&self) -> Result<()> {
+        let Some(target) = self.in_vivo_mpa else {
+            return Ok(());
+        };
+        let wrong = |found: String, advice: &str| Err(Error::setting("in_vivo_mpa", found, advice));
+        if !(target > 0.0 && target.is_finite()) {
+            return wrong(
+                format!("not usable: {target}"),
+                "give a strain energy density in MPa above 0 (usual: 0.02)",
+            );
+        }
+        let ends = |load: &Load| !matches!(load, Load::Stiffness | Load::Labels);
+        if self.loads.len() < 2 || self.loads.len() > MOST_LOADS || !self.loads.iter().all(ends) {
+            return wrong(
+                format!(
+                    "daily loads follow from 2 to {MOST_LOADS} loads of the ends, found {}",
+                    self.loads.len()
+                ),
+                "give loads = [\"uniaxial\", \"shear-x\", \"shear-y\"], or leave in_vivo_mpa out",
+            );
+        }
+        if self.solve.method != Method::VoxelFe
+            || self.solve.plasticity.is_some()
+            || self.error.is_some()
+        {
+            return wrong(
+                "daily loads follow from energy densities of elastic voxel elements".to_owned(),
+                "set method = \"voxel-fe\", and leave plasticity and error out",
+            );
+        }
+        Ok(())
     }
 
     /// The solves of every scan: one of each load.
@@ -142,8 +182,17 @@ const TABLES: [&str; 3] = ["segment", "lattice", "solve"];
 /// All keys of a recipe.
 fn known() -> Value {
     let mut known = serde_json::to_value(Recipe::default()).expect("settings are plain data");
+    known["in_vivo_mpa"] = Value::Null;
     // Where they are not used they are left out.
-    for key in ["plasticity", "element_mm"] {
+    for key in [
+        "plasticity",
+        "element_mm",
+        "ends_depth_mm",
+        "held",
+        "moved",
+        "pushed",
+        "supports",
+    ] {
         known["solve"][key] = Value::Null;
     }
     known
@@ -337,6 +386,15 @@ mod tests {
             ),
             ("loads = [\"shear-z\"]", "along the long axis"),
             ("error = 0.1\nloads = [\"torsion\"]", "torsion has none"),
+            (
+                "in_vivo_mpa = 0.02\nloads = [\"uniaxial\"]\n[solve]\nmethod = \"voxel-fe\"",
+                "from 2 to 10 loads",
+            ),
+            (
+                "in_vivo_mpa = 0.02\nloads = [\"uniaxial\", \"torsion\"]",
+                "elastic voxel elements",
+            ),
+            ("in_vivo_mpa = 0.0", "0.02"),
         ] {
             let words = parse(text).unwrap_err().to_string();
             assert!(words.contains(said), "{words}");

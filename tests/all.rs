@@ -9,6 +9,7 @@
 mod accuracy;
 mod answers;
 mod apparent;
+mod by_label;
 mod cli;
 mod cohort;
 mod dicom_series;

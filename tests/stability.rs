@@ -477,7 +477,11 @@ fn contrast(soft: f32) -> (usize, f64, f64) {
         ..poisson(0.3)
     };
     let motion = EndMotion::of(&specimen, &stretched, length);
-    let nodes = Gripped { mesh: &mesh, grips };
+    let nodes = Gripped {
+        mesh: &mesh,
+        grips,
+        uneven: None,
+    };
     let held = supports::held(&nodes, &motion, stretched.load);
     let start = supports::start(&nodes, &motion);
     let factor = |e: usize| if bone[e] == 1 { 1.0 } else { soft };

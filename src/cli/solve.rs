@@ -14,13 +14,15 @@ use bonepd_ct::physics::plasticity::Plasticity;
 use bonepd_ct::pipeline::apparent::checks::needs_modulus;
 use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::{
-    CoarsenBy, Conditions, Ends, Load, LoadSteps, Method, Sed, SolveParams,
+    CoarsenBy, Conditions, Ends, HeldLabel, Load, LoadSteps, Method, MovedLabel, PushedLabel, Sed,
+    SolveParams,
 };
 use bonepd_ct::result::answer::AnswerLine;
 use bonepd_ct::result::row::Row;
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// Compress a segmented scan and compute its apparent modulus E_app
 ///
@@ -69,12 +71,32 @@ pub struct SolveSettings {
     /// Thickness of each grip in mm; 0 grips the end planes [default: 0]
     #[arg(long, value_name = "MM", value_parser = words::number)]
     grip_mm: Option<f64>,
+    /// voxel-fe: grip the bone that is seen from each end plane, down to this depth, in place of the end planes: uneven ends
+    /// between platens [default: 0]
+    #[arg(long = "ends-depth", value_name = "MM", value_parser = words::number)]
+    ends_depth_mm: Option<f64>,
     /// uniaxial; confined (sides held); stiffness (voxel-fe: all six unit strains, to DIR/stiffness.json); shear-x, -y, -z (the
     /// upper end moves that way by strain times height); bending-x, -y, -z (both ends tilt about that axis by half of
     /// --angle-deg, in opposite directions); torsion (the upper end turns about the long axis by --angle-deg). Shear, bending and
-    /// torsion hold both ends in all components, about the middle of the grid [default: uniaxial]
+    /// torsion hold both ends in all components, about the middle of the grid. labels: what --held, --moved and --pushed say, which
+    /// imply it [default: uniaxial]
     #[arg(long, value_parser = words::choice::<Load>(Load::WORDS), hide_possible_values = true)]
     load: Option<Load>,
+    /// voxel-fe: hold the nodes of this label's voxels, in the components named or in all (repeat it for further labels). Labels are the
+    /// scan's own (segment --labels) or those of --supports
+    #[arg(long, value_name = "LABEL[:xyz]", value_parser = HeldLabel::from_str, conflicts_with_all = ["strain", "ends", "grip_mm", "angle_deg", "conditions"])]
+    held: Vec<HeldLabel>,
+    /// voxel-fe: displace the nodes of this label by so many mm along x, y, z; - leaves a component free
+    #[arg(long, value_name = "LABEL:UX,UY,UZ", value_parser = MovedLabel::from_str, conflicts_with_all = ["strain", "ends", "grip_mm", "angle_deg", "conditions"])]
+    moved: Vec<MovedLabel>,
+    /// voxel-fe: a total force in N along x, y, z, spread evenly over the nodes of this label. Writes, as --held and --moved do,
+    /// DIR/labels.csv: forces, moments, displacements and work of each label
+    #[arg(long, value_name = "LABEL:FX,FY,FZ", value_parser = PushedLabel::from_str, conflicts_with_all = ["strain", "ends", "grip_mm", "angle_deg", "conditions"])]
+    pushed: Vec<PushedLabel>,
+    /// Label image of --held, --moved and --pushed, on the scan's grid (before crop, turn, resampling and alignment, which it follows) or
+    /// on the mask's [default: the scan's own labels]
+    #[arg(long, value_name = "FILE")]
+    supports: Option<PathBuf>,
     /// Bending and torsion: degrees by which the ends turn against each other [default: 1]
     #[arg(long, value_name = "A", value_parser = words::number, allow_negative_numbers = true)]
     angle_deg: Option<f64>,
@@ -176,6 +198,7 @@ impl SolveSettings {
             self.refuse_resolution()?;
             params.method = Method::VoxelFe;
         }
+        self.replace_supports(params);
         lay_over(params, self)?;
         self.tissue.apply(params)?;
         if let Some(n) = self.refine_mask {
@@ -190,6 +213,21 @@ impl SolveSettings {
             criterion.critical_strain = self.critical_strain.unwrap_or(criterion.critical_strain);
         }
         params.check()
+    }
+
+    /// Supports and loads that options name replace those that were there, be they on labels or of ends.
+    fn replace_supports(&self, params: &mut SolveParams) {
+        let by_label = !(self.held.is_empty() && self.moved.is_empty() && self.pushed.is_empty());
+        if by_label || self.load.is_some_and(|load| load != Load::Labels) {
+            params.held.clear();
+            params.moved.clear();
+            params.pushed.clear();
+            params.supports = None;
+        }
+        if by_label {
+            params.load = Load::Labels;
+            (params.ends, params.grip_mm, params.ends_depth_mm) = (Ends::Free, 0.0, 0.0);
+        }
     }
 
     /// # Errors
@@ -215,6 +253,7 @@ impl SolveSettings {
 pub fn run(args: &SolveArgs, session: &Session, json: bool) -> Result<Outcome> {
     let mut params = start(args, session);
     args.settings.apply(&mut params, args.error.is_some())?;
+    bonepd_ct::command::solve::supports::lay(&args.dir, &mut params)?;
     let mut lattice = bonepd_ct::command::lattice::settings(&args.dir)?;
     args.lattice.apply(&mut lattice)?;
     if let Some(format) = &args.export {

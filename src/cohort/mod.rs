@@ -14,12 +14,13 @@ use crate::cohort::job::ScanJob;
 use crate::cohort::outcome::{ScanResult, Solved, State, in_words, outcome, result, said_of_kept};
 use crate::cohort::scans::Selection;
 use crate::command::estimate::{Estimate, estimate};
-use crate::command::solve::OpenScan;
+use crate::command::solve::{OpenScan, in_vivo, supports};
 use crate::command::{Outcome, adaptive, answer, lattice, report, segment};
 use crate::error::{Error, Result};
 use crate::io::{atomic, own_files, table};
 use crate::machine::host;
 use crate::machine::session::Session;
+use crate::pipeline::apparent::Field;
 use crate::recipe::Recipe;
 use crate::record::failures;
 use crate::record::failures::Failure;
@@ -322,12 +323,30 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
         None => recipe.solve.clone(),
     };
     let mut scan = OpenScan::open(dir, &opened_for, session.force, session)?;
+    let daily = recipe.in_vivo_mpa.filter(|_| !session.dry_run);
+    if daily.is_some() {
+        scan.keep_unit_fields();
+    }
     let mut rows = Vec::new();
-    for params in recipe.solves() {
+    for mut params in recipe.solves() {
+        supports::lay(dir, &mut params)?;
+        if daily.is_some() {
+            params.fields = vec![Field::Sed];
+        }
         rows.extend(match recipe.error {
             Some(target) => adaptive::solve_open_to(&mut scan, target, &params, session)?.rows,
             None => scan.solve(&recipe.lattice, &params, session)?,
         });
+    }
+    if let Some(target_mpa) = daily {
+        let criterion = recipe.solve.pistoia.unwrap_or_default();
+        in_vivo::combine(
+            &mut scan,
+            dir,
+            (target_mpa, criterion),
+            recipe.solve.axis,
+            session,
+        )?;
     }
     for row in &mut rows {
         row.marks.group.clone_from(&job.group);

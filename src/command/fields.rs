@@ -34,6 +34,15 @@ impl Fields {
         }
     }
 
+    /// The strain energy density of voxels, in place of all fields; None where there is none.
+    pub(super) fn take_energy_density(&mut self) -> Option<Volume<f32>> {
+        let Fields::OfVoxels(fields, _) = std::mem::replace(self, Fields::None) else {
+            return None;
+        };
+        let field = fields.into_iter().find(|field| field.name == "sed_mpa");
+        field.and_then(|mut field| field.components.pop())
+    }
+
     /// Of voxels `field-NAME.nii.gz` on the scan's grid each, with pictures, and all of them in `fields.vti` for ParaView; of sites
     /// `fields-LATTICE.vtk`; of smooth elements `fields-geometry-fe.vtu`.
     pub(super) fn write(&self, dir: &Path, specimen: &Specimen, load: Axis) -> Result<()> {

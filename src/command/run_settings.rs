@@ -24,6 +24,11 @@ pub fn of_run(dir: &Path) -> Result<Option<(PathBuf, SolveParams)>> {
         strain: run.strain,
         grip_mm: run.grip_mm,
         load: run.load,
+        held: run.held,
+        moved: run.moved,
+        pushed: run.pushed,
+        supports: run.supports,
+        ends_depth_mm: run.ends_depth_mm,
         angle_deg: run.angle_deg,
         sed: run.sed,
         ends: run.ends,
@@ -54,8 +59,10 @@ pub fn in_words(params: &SolveParams) -> String {
         true => format!("angle {}°", params.angle_deg),
         false => format!("strain {}", params.strain),
     };
+    let held = params.supports_in_words();
+    let held = held.map_or(String::new(), |words| format!(", {words}"));
     format!(
-        "load {}, axis {}, {far}, grips {} mm, ends {}, {tissue}, ν {}",
+        "load {}, axis {}, {far}, grips {} mm, ends {}{held}, {tissue}, ν {}",
         params.load.name(),
         params.axis.name(),
         params.grip_mm,

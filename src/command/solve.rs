@@ -1,6 +1,8 @@
 //! Owns `solve` on disk: every lattice of a segmented scan, `results.csv` and `results.json` written after each; and the same in memory.
 
+pub mod in_vivo;
 mod kept_steps;
+pub mod supports;
 
 #[doc(hidden)]
 pub use crate::command::fields::Fields;
@@ -14,6 +16,7 @@ use crate::format::orient::Turn;
 use crate::io::atomic;
 use crate::machine::meter::Meter;
 use crate::machine::session::Session;
+use crate::mask::ends;
 use crate::measure::morphometry::Morphometry;
 use crate::measure::thickness::plate_thickness_mm;
 use crate::pipeline::apparent::discretisation::Prepared;
@@ -32,12 +35,13 @@ use crate::result::derived::with_derived;
 use crate::result::details::Details;
 use crate::result::notes;
 use crate::result::row::{FailureLoad, Marks, Row};
-use crate::result::settings::{BoundaryRule, Settings};
+use crate::result::settings::{BoundaryRule, Motion, Settings};
 use crate::result::shape;
 use crate::result::shape::Image;
 use crate::result::voxel_check;
 use crate::solver::cg::CgStep;
 use crate::volume::{Specimen, Volume};
+use in_vivo::UnitField;
 use indicatif::ProgressBar;
 use kept_steps::{KeptSteps, StepsInMemory};
 use std::path::{Path, PathBuf};
@@ -58,6 +62,8 @@ pub struct OpenScan {
     axes: Turn,
     image: Image,
     in_memory: InMemory,
+    /// Energy densities of the loads solved since they were asked for, which are not written then.
+    unit_fields: Option<Vec<UnitField>>,
 }
 
 /// What solves of a scan in memory leave in addition to their rows, in the order of the solves.
@@ -70,6 +76,9 @@ pub struct InMemory {
     #[doc(hidden)]
     pub stiffness: Option<StiffnessRecord>,
 }
+
+/// Plane ends that touch less of the area that bone covers are uneven, or lie next to the bone.
+const LEAST_TOUCHED: f64 = 0.05;
 
 /// A row with its fields, and whether it was kept from an earlier solve.
 struct Made {
@@ -145,7 +154,13 @@ impl OpenScan {
             image,
             specimen,
             in_memory: InMemory::default(),
+            unit_fields: None,
         })
+    }
+
+    /// Keeps the energy densities of the solves to come in memory, in place of files.
+    pub(crate) fn keep_unit_fields(&mut self) {
+        self.unit_fields = Some(Vec::new());
     }
 
     /// What the solves of a scan in memory left so far; it is taken out.
@@ -229,19 +244,34 @@ impl OpenScan {
         if let Some((_, blank)) = jobs.first() {
             warn_of_unusual(&blank.key, height_mm, session);
         }
+        let touching = self.barely_touching(params);
+        touching.iter().for_each(|words| session.warn(words));
         let mut rows = Vec::new();
         for (job, blank) in &jobs {
             let Some(Made {
                 mut row,
                 details,
-                fields,
+                mut fields,
                 is_kept,
             }) = self.row(job, blank, params, session)?
             else {
                 continue;
             };
+            if let Some(units) = &mut self.unit_fields {
+                let taken = fields.take_energy_density().map(|sed_mpa| UnitField {
+                    row: row.clone(),
+                    sed_mpa,
+                });
+                units.extend(taken);
+            }
             mark(&mut row, self.morphometry.as_ref());
             cautions::mark(&mut row, height_mm);
+            if let Some(words) = &touching {
+                notes::add(
+                    &mut row.marks.note,
+                    &format!("{}{words}", cautions::WARNING),
+                );
+            }
             session.result(format!("{}{}", in_words(&row), said_of_kept(is_kept)));
             if let Some(line) = details.as_ref().and_then(sections_in_words) {
                 session.result(line);
@@ -368,7 +398,10 @@ impl OpenScan {
             }
             JobResult::Stiffness(solved) => {
                 let mask_blake3 = self.results.mask_blake3();
-                let record = stiffness::record(&solved, &self.specimen, params, mask_blake3);
+                let fabric = self.morphometry.as_ref().and_then(|m| m.fabric.as_ref());
+                let mil_mm = fabric.map(|fabric| fabric.mil_mm);
+                let record =
+                    stiffness::record(&solved, &self.specimen, params, mask_blake3, mil_mm);
                 let row = stiffness::row(&solved, params, blank);
                 match &self.dir {
                     Some(dir) => stiffness::write(dir, &record, session)?,
@@ -411,6 +444,23 @@ impl OpenScan {
             .as_ref()
             .is_some_and(|law| law.starts_with("labels"));
         labelled && self.tissue.contrast(self.specimen.bone.as_slice()) > shape::MOST_CONTRAST
+    }
+
+    /// What to say where plane ends touch little of the bone.
+    fn barely_touching(&self, params: &SolveParams) -> Option<String> {
+        let has_plane_ends = !matches!(params.load.motion(), None | Some(Motion::ByLabel))
+            && params.ends_depth_mm == 0.0
+            && params.grip_mm == 0.0;
+        let touched = has_plane_ends
+            .then(|| ends::touched(&self.specimen.bone, params.axis))
+            .flatten()?;
+        let [lower, upper] = touched.map(|share| format!("{:.1} %", 100.0 * share));
+        touched.iter().any(|share| *share < LEAST_TOUCHED).then(|| {
+            format!(
+                "the end planes touch little bone: {lower} of the area that all bone covers along {} at the lower end, {upper} at the upper. If the ends are uneven, grip what is seen of them (voxel-fe: --ends-depth MM), cut them flat (segment --plane-cut MM), or --crop",
+                params.axis.name()
+            )
+        })
     }
 
     /// Struts thinner than two lattice parameters are one or two sites thick, which sites of firm and floppy lattices

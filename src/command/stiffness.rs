@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::machine::session::Session;
 use crate::measure::stiffness::{orthotropic, young_along};
+use crate::measure::zysset_curnier::plausible;
 use crate::pipeline::apparent::SolveParams;
 use crate::pipeline::apparent::stiffness::Stiffness;
 use crate::record::stiffness as file;
@@ -29,8 +30,23 @@ pub fn record(
     specimen: &Specimen,
     params: &SolveParams,
     mask_blake3: &str,
+    mil_mm: Option<[f64; 3]>,
 ) -> StiffnessRecord {
+    let own = orthotropic(&solved.matrix_mpa);
+    let conditions = format!("{} conditions", params.conditions.name());
+    let place = || {
+        let of = (specimen.bv_tv(), mil_mm);
+        plausible(
+            &solved.matrix_mpa,
+            own.as_ref(),
+            of,
+            params.young_mpa,
+            &conditions,
+        )
+    };
     StiffnessRecord {
+        mil_mm,
+        plausible: params.material.is_none().then(place).flatten(),
         program: env!("CARGO_PKG_NAME").to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scan: specimen.name.clone(),
@@ -50,7 +66,7 @@ pub fn record(
         stiffness_mpa: solved.matrix_mpa,
         algebraic_error_mpa: solved.error_mpa,
         asymmetry_mpa: solved.asymmetry_mpa,
-        orthotropic: orthotropic(&solved.matrix_mpa),
+        orthotropic: own,
     }
 }
 
@@ -117,5 +133,8 @@ fn say(record: &StiffnessRecord, session: &Session) {
             list(&o.poisson),
             100.0 * o.residual
         ));
+    }
+    if let Some(place) = &record.plausible {
+        session.result(format!("plausible? {}", place.in_words));
     }
 }

@@ -135,6 +135,22 @@ impl VoxelMesh {
         VoxelMesh::of(grid, &all, &kept)
     }
 
+    /// Meshes the voxels for which `is_bone` holds and that are joined to a run for which `low` holds and to one for which `high` does.
+    ///
+    /// # Errors
+    /// If there are more nodes than 32-bit numbers.
+    pub fn joining<T: Sync>(
+        grid: Grid,
+        voxels: &[T],
+        is_bone: impl Fn(&T) -> bool + Sync,
+        low: impl Fn(Run, usize, usize) -> bool,
+        high: impl Fn(Run, usize, usize) -> bool,
+    ) -> Result<Self> {
+        let all = Runs::of(grid.n, voxels, is_bone);
+        let kept = all.spanning(low, high);
+        VoxelMesh::of(grid, &all, &kept)
+    }
+
     fn of(grid: Grid, all: &Runs, kept: &Runs) -> Result<Self> {
         let rows = Rows::number(kept)?;
         let (segments, around) = rows.fill(kept);

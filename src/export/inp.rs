@@ -44,6 +44,18 @@ pub fn write(path: &Path, specimen: &Specimen, params: &SolveParams, bins: usize
     if params.method != Method::VoxelFe {
         return wrong("lattices have no bricks", "add --method voxel-fe");
     }
+    if params.ends_depth_mm > 0.0 {
+        return wrong(
+            "uneven ends are not written to such a file",
+            "leave --ends-depth out, or cut the ends flat (segment --plane-cut)",
+        );
+    }
+    if params.load == Load::Labels {
+        return wrong(
+            "supports by label are not written to such a file",
+            "use --load uniaxial, confined, or another load between ends",
+        );
+    }
     if params.load == Load::Stiffness {
         return wrong(
             "six unit strains are six models",
@@ -145,6 +157,8 @@ fn said(motion: &EndMotion, params: &SolveParams) -> String {
     } = motion.loaded;
     let [x, y, z] = motion.middle_at(gauge_mm);
     match motion.motion {
+        // Refused before.
+        Motion::ByLabel => String::new(),
         Motion::Along => {
             format!("E_app = force of HIGH x {gauge_mm} mm / (area x {displacement_mm} mm)")
         }
@@ -167,7 +181,11 @@ fn fill(
     materials: &Materials,
 ) -> std::io::Result<()> {
     let axis = params.axis.index();
-    let nodes = Gripped { mesh, grips };
+    let nodes = Gripped {
+        mesh,
+        grips,
+        uneven: None,
+    };
     let held = supports::held(&nodes, motion, params.load);
     let u = supports::start(&nodes, motion);
     writeln!(

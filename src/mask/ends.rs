@@ -1,5 +1,6 @@
-//! Owns flat ends: the slices between which every part of a section bears bone.
+//! Owns the ends of a specimen: the slices between which every part of a section bears bone, and how much of it plane ends touch.
 
+use crate::grid::Axis;
 use crate::volume::Volume;
 
 /// Tiles with less than this share of the median tile's bone are slivers of the rim: where they end says nothing.
@@ -27,6 +28,23 @@ pub fn flat(bone: &Volume<u8>, tile_mm: f64) -> Option<[usize; 2]> {
     let first = bearing().map(|tile| tile.first).max()?;
     let end = bearing().map(|tile| tile.end).min()?;
     (first < end).then_some([first, end])
+}
+
+/// Bone in the first and in the last slice across `axis` over the area that all bone covers as seen along it. None without bone.
+pub fn touched(bone: &Volume<u8>, axis: Axis) -> Option<[f64; 2]> {
+    let (n, voxels) = (bone.grid.n, bone.as_slice());
+    let a = axis.index();
+    let [b, c] = [[1, 2], [0, 2], [0, 1]][a];
+    let mut seen = vec![false; n[b] * n[c]];
+    let mut ends = [0usize; 2];
+    for (i, _) in voxels.iter().enumerate().filter(|(_, v)| **v != 0) {
+        let at = [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
+        seen[at[c] * n[b] + at[b]] = true;
+        ends[0] += usize::from(at[a] == 0);
+        ends[1] += usize::from(at[a] + 1 == n[a]);
+    }
+    let area = seen.iter().filter(|seen| **seen).count();
+    (area > 0).then(|| ends.map(|count| count as f64 / area as f64))
 }
 
 #[derive(Clone, Copy)]
@@ -73,6 +91,18 @@ mod tests {
         assert_eq!(flat(&slanted, 0.05), Some([3, 19]));
         // Tiles wider than the section: only what is empty goes.
         assert_eq!(flat(&slanted, 5.0), Some([3, 28]));
+    }
+
+    #[test]
+    fn plane_ends_touch_a_share_of_what_is_seen() {
+        // A plate of 20 × 20 that stands on a foot of 4 × 5, empty above.
+        let table = block(|[x, y, z]| z < 28 && z > 4 || z <= 4 && x < 4 && y < 5);
+        assert_eq!(touched(&table, Axis::Z), Some([20.0 / 400.0, 0.0]));
+        assert_eq!(
+            touched(&table, Axis::X).map(|t| t.map(|v| v > 0.8)),
+            Some([true, true])
+        );
+        assert_eq!(touched(&block(|_| false), Axis::Z), None);
     }
 
     #[test]

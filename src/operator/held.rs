@@ -47,6 +47,21 @@ impl Held {
     }
 }
 
+/// What acts on a body from outside: prescribed unknowns, and forces on the others.
+#[derive(Debug, Clone, Copy)]
+pub struct Outside<'a, const D: usize> {
+    /// The unknowns that keep their values.
+    pub held: &'a Held,
+    /// Force on each unknown; what stands in held components goes into the support. None: no forces.
+    pub forces: Option<&'a [[f64; D]]>,
+}
+
+impl<'a, const D: usize> From<&'a Held> for Outside<'a, D> {
+    fn from(held: &'a Held) -> Self {
+        Outside { held, forces: None }
+    }
+}
+
 /// An operator restricted to the free unknowns: held rows of the result are zero. Symmetric as long as the held
 /// components of what it is applied to are zero, which search directions keep.
 pub struct Constrained<'a, O, const D: usize> {

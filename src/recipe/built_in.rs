@@ -20,6 +20,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "load-history-3",
     "load-history-6",
     "stiffness",
+    "vertebra",
 ];
 
 /// Scenes of `scene`: name and text. Files that they name lie in `sample_data/`.

@@ -52,12 +52,12 @@ pub(super) const POISSON: Column = column("poisson", "", "Poisson's ratio of the
 pub(super) const LOAD: Column = column(
     "load",
     "",
-    "uniaxial (sides free), confined (sides held), stiffness (six unit strains); shear-x (direction), bending-x (axis of the tilt), torsion: both ends held in all components",
+    "uniaxial (sides free), confined (sides held), stiffness (six unit strains); shear-x (direction), bending-x (axis of the tilt), torsion: both ends held in all components; labels: as column `supports` says",
 );
 pub(super) const ENDS: Column = column(
     "ends",
     "",
-    "free: loaded ends slide sideways; bonded: they do not; of load stiffness: kinematic, mixed or symshear faces",
+    "free: loaded ends slide sideways; bonded: they do not; of load stiffness: kinematic, mixed or symshear faces; labels where `load` is labels",
 );
 pub(super) const AXIS: Column = column(
     "axis",
@@ -79,7 +79,7 @@ pub(super) const FAILURE_LOAD: Column = column(
 pub(super) const STRAIN: Column = column(
     "strain",
     "",
-    "nominal strain; negative is compression. 0 under bending and torsion",
+    "nominal strain; negative is compression. 0 under bending, torsion and labels",
 );
 pub(super) const ANGLE: Column = column(
     "angle_deg",
@@ -89,12 +89,12 @@ pub(super) const ANGLE: Column = column(
 pub(super) const STIFFNESS: Column = column(
     "stiffness_n_per_mm",
     "N/mm",
-    "force over the displacement of the ends; of compression E_app A / L. NA under bending and torsion",
+    "force over the displacement of the ends; of compression E_app A / L. NA under bending and torsion. Of one label that is moved or pushed: its force over its displacement, both along what is prescribed; NA of several",
 );
 pub(super) const FORCE: Column = column(
     "force_n",
     "N",
-    "force of the moved end along its displacement at the strain applied, a magnitude",
+    "force of the moved end along its displacement at the strain applied, a magnitude; of one label that is moved along its displacement, of one that is pushed its force",
 );
 pub(super) const MOMENT: Column = column(
     "moment_nmm",

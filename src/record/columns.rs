@@ -13,7 +13,7 @@ pub use crate::record::column::{Column, File};
 use crate::record::detail_columns;
 
 /// All files, in the order in which readers meet them.
-pub const FILES: [File; 18] = [
+pub const FILES: [File; 21] = [
     File {
         name: own_files::ANSWERS,
         about: "one row for each scan: its apparent modulus with its stated error, from the row with the smallest stated error",
@@ -25,11 +25,13 @@ pub const FILES: [File; 18] = [
         columns: &RESULTS,
     },
     detail_columns::REACTIONS,
+    detail_columns::LABELS,
     detail_columns::FAILURE,
     detail_columns::SECTIONS,
     detail_columns::TISSUE,
     detail_columns::YIELDED,
     detail_columns::CURVE,
+    detail_columns::IN_VIVO,
     File {
         name: "groups.csv",
         about: "one row a quantity and group (in the report's folder)",
@@ -40,6 +42,7 @@ pub const FILES: [File; 18] = [
         about: "one row a quantity and pair of groups (in the report's folder)",
         columns: &groups::COMPARISONS,
     },
+    detail_columns::FABRIC_FIT,
     File {
         name: "stiffness.csv",
         about: "one row a scan whose stiffness was computed (in the report's folder; the tensor itself is in stiffness.json)",
@@ -141,7 +144,7 @@ const ANSWERS: [Column; 28] = [
     MAX_ERROR,
 ];
 
-const RESULTS: [Column; 65] = [
+const RESULTS: [Column; 66] = [
     SCAN,
     METHOD,
     STRUCTURE,
@@ -299,8 +302,14 @@ const RESULTS: [Column; 65] = [
         "",
         "volume of the model that carries load over TV: cells of sites (connected, weighted: their bone) or elements; bv_tv is the bone's",
     ),
+    SUPPORTS,
 ];
 
+const SUPPORTS: Column = column(
+    "supports",
+    "",
+    "which labels of an image are held, moved and pushed (numbers of each: labels.csv), or to which depth uneven ends are gripped; NA for plane ends",
+);
 const MAX_STRESS: Column = column(
     "max_stress_mpa",
     "MPa",
@@ -327,14 +336,16 @@ mod tests {
     use crate::io::table::to_csv;
     use crate::record::details::Line;
     use crate::record::failures::Failure;
+    use crate::record::in_vivo::InVivoLine;
     use crate::record::stiffness::StiffnessLine;
     use crate::report::groups::{ComparisonLine, GroupLine};
     use crate::report::statistics::{AgreementLine, BoxLine, RegressionLine};
     use crate::report::table;
     use crate::result::answer::AnswerLine;
-    use crate::result::details::{EndForces, FailureAt, SectionShare, TissueSpread};
+    use crate::result::details::{EndForces, FailureAt, LabelForces, SectionShare, TissueSpread};
     use crate::result::row::Row;
     use crate::result::statistics::anova::Anova;
+    use crate::result::statistics::fabric_elasticity::FabricFitLine;
     use crate::result::strength::{CurvePoint, YieldedShare};
     use std::collections::BTreeSet;
 
@@ -354,10 +365,13 @@ mod tests {
             ("comparisons.csv", to_csv::<ComparisonLine>(&[])),
             ("stiffness.csv", to_csv::<StiffnessLine>(&[])),
             ("reactions.csv", to_csv::<Line<EndForces>>(&[])),
+            ("labels.csv", to_csv::<Line<LabelForces>>(&[])),
             ("failure.csv", to_csv::<Line<FailureAt>>(&[])),
             ("sections.csv", to_csv::<Line<SectionShare>>(&[])),
             ("tissue.csv", to_csv::<Line<TissueSpread>>(&[])),
             ("yielded.csv", to_csv::<Line<YieldedShare>>(&[])),
+            ("in_vivo.csv", to_csv::<InVivoLine>(&[])),
+            ("fabric_fit.csv", to_csv::<FabricFitLine>(&[])),
             ("curve.csv", to_csv::<CurvePoint>(&[])),
         ] {
             let file = FILES.iter().find(|f| f.name == name).unwrap();

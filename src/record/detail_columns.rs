@@ -52,6 +52,41 @@ pub const REACTIONS: File = File {
     ]),
 };
 
+pub const LABELS: File = File {
+    name: "labels.csv",
+    about: "what labels that are held, moved and pushed come to, one line a label; signed, along the specimen's axes; off to first order in the solver's error, so solve with --tolerance 1e-8 where forces must balance",
+    columns: &with::<32>(&[
+        column("label", "", "value of the label image"),
+        column("role", "", "held, moved or pushed"),
+        column("nodes", "", "nodes of bone at the corners of its voxels"),
+        column("force_x_n", "N", "force from outside on its nodes"),
+        column("force_y_n", "N", "the same along y"),
+        column("force_z_n", "N", "the same along z"),
+        column(
+            "moment_x_nmm",
+            "N mm",
+            "moment of those forces about the mean place of the nodes",
+        ),
+        column("moment_y_nmm", "N mm", "the same about y"),
+        column("moment_z_nmm", "N mm", "the same about z"),
+        column(
+            "about_x_mm",
+            "mm",
+            "mean place of the nodes, from the specimen's corner",
+        ),
+        column("about_y_mm", "mm", "the same along y"),
+        column("about_z_mm", "mm", "the same along z"),
+        column("displacement_x_mm", "mm", "mean displacement of the nodes"),
+        column("displacement_y_mm", "mm", "the same along y"),
+        column("displacement_z_mm", "mm", "the same along z"),
+        column(
+            "work_nmm",
+            "N mm",
+            "force times displacement, over the nodes: half the sum of all labels is the elastic energy",
+        ),
+    ]),
+};
+
 const LABEL: Column = column(
     "label",
     "",
@@ -170,6 +205,68 @@ pub const CURVE: File = File {
             "of the ends since the start: mean force of a step times its displacement",
         ),
         column("iterations", "", "of conjugate gradients in this step"),
+    ],
+};
+
+pub const IN_VIVO: File = File {
+    name: "in_vivo.csv",
+    about: "daily loads that even out the tissue's loading, one line a unit load, of a run whose recipe has in_vivo_mpa",
+    columns: &[
+        SCAN,
+        LOAD,
+        column("unit", "", "of unit_load and amplitude: N, or N mm"),
+        column(
+            "unit_load",
+            "",
+            "force or moment of the load that was solved",
+        ),
+        column("amplitude", "", "the estimate: with which this load acts"),
+        column(
+            "factor",
+            "",
+            "of the energy field over the square of the unit load: the amplitude squared",
+        ),
+        column("energy_share", "", "share in the combined energy, 0 to 1"),
+        column("target_mpa", "MPa", "energy density that was aimed at"),
+        column(
+            "mean_mpa",
+            "MPa",
+            "mean of the combined field (field-sed-in-vivo-mpa), capped at its 95th percentile",
+        ),
+        column("sd_mpa", "MPa", "standard deviation of that field"),
+        column(
+            "failure_factor",
+            "",
+            "what these loads are multiplied by to fail by Pistoia's criterion, of the combined field",
+        ),
+    ],
+};
+
+pub const FABRIC_FIT: File = File {
+    name: "fabric_fit.csv",
+    about: "the law of Zysset and Curnier fitted to the tensors of at least five scans with measured fabric (in the report's folder)",
+    columns: &[
+        column("conditions", "", "boundary conditions of the tensors"),
+        column(
+            "parameter",
+            "",
+            "E0, nu0, G0, k, l of E_i = E0 rho^k m_i^2l, nu_ij / E_i = nu0 / (E0 rho^k (m_i m_j)^l), G_ij = G0 rho^k (m_i m_j)^l",
+        ),
+        column(
+            "unit",
+            "",
+            "of value, low and high; empty for exponents and nu0",
+        ),
+        column("value", "", "the estimate"),
+        column("low", "", "lower end of the 95 % confidence interval"),
+        column("high", "", "upper end"),
+        column("scans", "", "tensors, of nine constants each"),
+        column("r2", "", "coefficient of determination of the logarithms"),
+        column(
+            "scatter_percent",
+            "",
+            "one standard deviation of the logarithms, in % of the value",
+        ),
     ],
 };
 

@@ -4,7 +4,9 @@
 use crate::error::Result;
 use crate::grid::Axis;
 use crate::io::{atomic, table};
-use crate::result::details::{Details, EndForces, FailureAt, SectionShare, TissueSpread};
+use crate::result::details::{
+    Details, EndForces, FailureAt, LabelForces, SectionShare, TissueSpread,
+};
 use crate::result::settings::load_steps::LoadSteps;
 use crate::result::settings::{BoundaryRule, CellType, Load, Method, Sed, Settings, Supports};
 use crate::result::strength::{CurvePoint, YieldedShare};
@@ -12,6 +14,7 @@ use serde::Serialize;
 use std::path::Path;
 
 pub const REACTIONS: &str = "reactions.csv";
+pub const LABELS: &str = "labels.csv";
 pub const FAILURE: &str = "failure.csv";
 pub const SECTIONS: &str = "sections.csv";
 pub const TISSUE: &str = "tissue.csv";
@@ -81,6 +84,7 @@ pub fn write<'a>(
     rows: impl Iterator<Item = (&'a Settings, &'a Details)> + Clone,
 ) -> Result<()> {
     table_of::<EndForces>(&dir.join(REACTIONS), rows.clone(), |d| &d.ends)?;
+    table_of::<LabelForces>(&dir.join(LABELS), rows.clone(), |d| &d.labels)?;
     table_of::<FailureAt>(&dir.join(FAILURE), rows.clone(), |d| &d.failure)?;
     table_of::<SectionShare>(&dir.join(SECTIONS), rows.clone(), |d| &d.sections)?;
     table_of::<YieldedShare>(&dir.join(YIELDED), rows.clone(), |d| &d.yielded)?;
@@ -89,7 +93,7 @@ pub fn write<'a>(
 
 /// Removes the tables in `dir`, whose rows are set aside.
 pub fn remove(dir: &Path) {
-    for table in [REACTIONS, FAILURE, SECTIONS, TISSUE, YIELDED, CURVE] {
+    for table in [REACTIONS, LABELS, FAILURE, SECTIONS, TISSUE, YIELDED, CURVE] {
         let _ = std::fs::remove_file(dir.join(table));
     }
 }

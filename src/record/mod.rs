@@ -9,6 +9,7 @@ pub mod details;
 pub mod error_target_note;
 pub mod failures;
 pub mod history;
+pub mod in_vivo;
 pub mod results;
 pub mod specimen;
 pub mod state;

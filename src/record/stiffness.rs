@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::io::atomic;
 use crate::measure::stiffness::{Orthotropic, Six};
+use crate::measure::zysset_curnier::Plausible;
 use crate::pipeline::apparent::SolveParams;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -40,6 +41,12 @@ pub struct StiffnessRecord {
     pub asymmetry_mpa: f64,
     /// None for a stiffness that is not positive definite.
     pub orthotropic: Option<Orthotropic>,
+    /// Mean intercept lengths of the bone, the longest first; None where they were not measured.
+    #[serde(default)]
+    pub mil_mm: Option<[f64; 3]>,
+    /// Where the tensor lies among published ones; None for tissue that is not one modulus.
+    #[serde(default)]
+    pub plausible: Option<Plausible>,
 }
 
 /// One line of `stiffness.csv`: the orthotropic constants of a scan; None for a stiffness that is not positive definite.

@@ -25,6 +25,8 @@ pub struct Condition {
     pub tissue: Tissue,
     /// The law by which tissue yields; None where it stays elastic.
     pub plasticity: Option<String>,
+    /// Labels that are held, moved and pushed, or how deep uneven ends are gripped.
+    pub held_by: Option<String>,
 }
 
 /// Young's modulus of the tissue: one, or a law.
@@ -55,6 +57,7 @@ impl Condition {
                 None => Tissue::Uniform(key.young_mpa),
             },
             plasticity: key.plasticity.clone(),
+            held_by: key.held_by.clone(),
         }
     }
 
@@ -69,7 +72,7 @@ impl Condition {
         if self.load == Load::Stiffness {
             let faces = match self.supports {
                 Supports::Faces(conditions) => conditions,
-                Supports::Ends(_) => Conditions::default(),
+                Supports::Ends(_) | Supports::Labels => Conditions::default(),
             };
             return format!(
                 "Six unit strains under {}; E_app is Young's modulus along {axis} of the stiffness matrix.",
@@ -92,7 +95,10 @@ impl Condition {
                 "the outer {} mm at each end move as rigid plates",
                 self.grip_mm
             ),
-            false => "the end planes are loaded".to_owned(),
+            false => match &self.held_by {
+                Some(held) => format!("uneven ends ({held}) move as one"),
+                None => "the end planes are loaded".to_owned(),
+            },
         };
         let sides = match self.load {
             Load::Confined => "the sides are held (confined)",
@@ -109,6 +115,12 @@ impl Condition {
         let (axis, angle) = (self.axis.name(), self.angle_deg.unwrap_or_default());
         let how = match self.load.motion()? {
             Motion::Along => return None,
+            Motion::ByLabel => {
+                return Some(format!(
+                    "Supports and loads on the nodes of labels: {} (mm, N).",
+                    self.held_by.as_deref().unwrap_or_default()
+                ));
+            }
             Motion::Sideways(direction) => format!(
                 "Shear: the upper end moves along {} by {} % of the height along {axis}",
                 direction.name(),
@@ -123,9 +135,10 @@ impl Condition {
                 "Torsion: the upper end turns by {angle}° about {axis} through the middle of the grid"
             ),
         };
-        let grips = match self.grip_mm > 0.0 {
-            true => format!(" (grips of {} mm)", self.grip_mm),
-            false => String::new(),
+        let grips = match (self.grip_mm > 0.0, &self.held_by) {
+            (true, _) => format!(" (grips of {} mm)", self.grip_mm),
+            (false, Some(held)) => format!(" ({held})"),
+            (false, None) => String::new(),
         };
         Some(format!(
             "{how}; both ends are held in all components{grips}; the sides are free."
@@ -208,6 +221,13 @@ impl Condition {
             match &self.plasticity {
                 Some(law) => format!("yield {law}"),
                 None => "elastic tissue".to_owned(),
+            },
+        );
+        say(
+            self.held_by != other.held_by,
+            match &self.held_by {
+                Some(words) => format!("supports {words}"),
+                None => "plane ends".to_owned(),
             },
         );
         words.join(", ")

@@ -11,6 +11,9 @@ pub struct Details {
     /// `reactions.csv`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ends: Vec<EndForces>,
+    /// `labels.csv`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub labels: Vec<LabelForces>,
     /// `failure.csv`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failure: Vec<FailureAt>,
@@ -68,6 +71,43 @@ impl EndForces {
     pub fn about_mm(&self) -> [f64; 3] {
         [self.about_x_mm, self.about_y_mm, self.about_z_mm]
     }
+}
+
+/// What a label that is held, moved or pushed comes to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+pub struct LabelForces {
+    /// Value of the label image.
+    pub label: i32,
+    /// `held`, `moved` or `pushed`.
+    pub role: String,
+    /// Nodes of bone at the corners of its voxels.
+    pub nodes: u64,
+    /// Force from outside on its nodes, along x.
+    pub force_x_n: f64,
+    /// The same along y.
+    pub force_y_n: f64,
+    /// The same along z.
+    pub force_z_n: f64,
+    /// Moment of those forces about the mean place of the nodes, about x.
+    pub moment_x_nmm: f64,
+    /// The same about y.
+    pub moment_y_nmm: f64,
+    /// The same about z.
+    pub moment_z_nmm: f64,
+    /// Mean place of the nodes, from the corner of the specimen.
+    pub about_x_mm: f64,
+    /// The same along y.
+    pub about_y_mm: f64,
+    /// The same along z.
+    pub about_z_mm: f64,
+    /// Mean displacement of the nodes, along x.
+    pub displacement_x_mm: f64,
+    /// The same along y.
+    pub displacement_y_mm: f64,
+    /// The same along z.
+    pub displacement_z_mm: f64,
+    /// Sum of force times displacement over the nodes: twice what these nodes put into the elastic energy.
+    pub work_nmm: f64,
 }
 
 /// Failure by Pistoia's criterion at one critical volume.

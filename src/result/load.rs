@@ -28,6 +28,8 @@ pub enum Load {
     BendingZ,
     /// The upper end turns about the load axis.
     Torsion,
+    /// Supports and loads stand on the labels of an image.
+    Labels,
 }
 
 /// What the ends do against each other.
@@ -41,6 +43,8 @@ pub enum Motion {
     Tilt(Axis),
     /// The upper end turns about the load axis.
     Turn,
+    /// Labels of an image are held, moved and pushed; there are no ends.
+    ByLabel,
 }
 
 impl Motion {
@@ -63,6 +67,7 @@ impl Load {
         "bending-y",
         "bending-z",
         "torsion",
+        "labels",
     ];
 
     /// The word of settings and results.
@@ -82,6 +87,7 @@ impl Load {
             Load::BendingY => Motion::Tilt(Axis::Y),
             Load::BendingZ => Motion::Tilt(Axis::Z),
             Load::Torsion => Motion::Turn,
+            Load::Labels => Motion::ByLabel,
         })
     }
 

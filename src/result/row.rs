@@ -190,6 +190,12 @@ impl Row {
         }
     }
 
+    /// Force in N, or moment in N mm, of the moved end, a magnitude.
+    pub fn load_carried_by_ends(&self) -> Option<f64> {
+        let solved = self.solved.as_ref()?;
+        solved.force_n.or(solved.moment_nmm)
+    }
+
     /// Failure by Pistoia's criterion; None where it was not asked for.
     pub fn failure(&self) -> Option<FailureLoad> {
         self.solved.as_ref()?.failure
@@ -291,7 +297,7 @@ mod tests {
             (
                 ",free,",
                 ",glued,",
-                "bonded, kinematic, mixed, symshear, found `glued`",
+                "bonded, kinematic, mixed, symshear, labels, found `glued`",
             ),
             ("NA,0,0.0", "1;2,0,0.0", "registration"),
             ("method", "methods", "missing field `method`"),

@@ -1,5 +1,6 @@
 //! Owns what a row of results follows from: the scan, the method, the load, the supports and the tissue.
 
+pub mod by_label;
 pub mod load_steps;
 
 use crate::discretisation::lattice::placement::Boundary;
@@ -127,6 +128,8 @@ pub enum Supports {
     Ends(Ends),
     /// All six faces, under unit strains.
     Faces(Conditions),
+    /// The labels of an image, as column `supports` says.
+    Labels,
 }
 
 impl Supports {
@@ -135,6 +138,7 @@ impl Supports {
         match self {
             Supports::Ends(ends) => ends.name(),
             Supports::Faces(conditions) => conditions.name(),
+            Supports::Labels => Load::Labels.name(),
         }
     }
 }
@@ -195,7 +199,8 @@ words!(
         Supports::Ends(Ends::Bonded),
         Supports::Faces(Conditions::Kinematic),
         Supports::Faces(Conditions::Mixed),
-        Supports::Faces(Conditions::Symshear)
+        Supports::Faces(Conditions::Symshear),
+        Supports::Labels
     ]
 );
 
@@ -273,6 +278,8 @@ pub struct Settings {
     pub plasticity: Option<String>,
     /// Load steps of such tissue.
     pub steps: Option<LoadSteps>,
+    /// Which labels are held, moved and pushed, or to which depth uneven ends are gripped; None for plane ends.
+    pub held_by: Option<String>,
 }
 
 impl Settings {

@@ -103,7 +103,11 @@ fn plain(specimen: &Specimen, params: &SolveParams) -> (usize, f64) {
     let grips = Planes::within(&grid, params.axis, 0.0).expect("room between the ends");
     let motion = EndMotion::of(specimen, params, grid.size_mm()[params.axis.index()]);
     let mesh = model.mesh();
-    let nodes = Gripped { mesh, grips };
+    let nodes = Gripped {
+        mesh,
+        grips,
+        uneven: None,
+    };
     let held = supports::held(&nodes, &motion, params.load);
     let mut u = supports::start(&nodes, &motion);
     let diagonal = Jacobi::new(&Constrained {

@@ -24,7 +24,11 @@ pub fn e_app_mpa(specimen: &Specimen, params: &SolveParams) -> (f64, Probed) {
     let grips = Planes::within(&mesh.grid, params.axis, 0.0).unwrap();
     let length = specimen.length_mm(params.axis);
     let motion = EndMotion::of(specimen, params, length);
-    let nodes = Gripped { mesh, grips };
+    let nodes = Gripped {
+        mesh,
+        grips,
+        uneven: None,
+    };
     let held = supports::held(&nodes, &motion, params.load);
     let mut u = supports::start(&nodes, &motion);
     for (node, u) in u.iter_mut().enumerate() {

@@ -56,6 +56,7 @@ fn has_still(name: &str, load: Axis) -> bool {
 fn in_words(name: &str) -> String {
     match name {
         "sed_mpa" => "strain energy\ndensity (MPa)".to_owned(),
+        "sed_in_vivo_mpa" => "strain energy density\nof daily loads (MPa)".to_owned(),
         "von_mises_mpa" => "von Mises\nstress (MPa)".to_owned(),
         "displacement_x_mm" => "displacement\nalong x (mm)".to_owned(),
         "displacement_y_mm" => "displacement\nalong y (mm)".to_owned(),

@@ -16,8 +16,11 @@ use crate::machine::host;
 use crate::machine::session::Session;
 use crate::recipe::Recipe;
 use crate::record::collect_rows::CollectedRows;
-use crate::record::details::{FAILURE, REACTIONS, SECTIONS, TISSUE, YIELDED, curve as curve_of};
+use crate::record::details::{
+    FAILURE, LABELS, REACTIONS, SECTIONS, TISSUE, YIELDED, curve as curve_of,
+};
 use crate::record::failures::Failure;
+use crate::record::in_vivo::IN_VIVO;
 use crate::record::results::mask_blake3;
 use crate::record::specimen;
 use crate::record::stiffness::StiffnessLine;
@@ -114,12 +117,17 @@ pub fn write(sources: Sources, out: &Path, session: &Session) -> Result<Vec<Path
         format!("{}: failed, no results: {reason}", f.scan)
     });
     report.notes.splice(0..0, failed);
+    let fabric_table = fabric_fit(folders).map(|(table, words)| {
+        report.notes.push(words);
+        table
+    });
     let mut pages: Vec<ScanPage> = folders.scans().map(page).collect();
     let views = views::linked(&mut pages, folders);
     let methods = written(&report, &methods::known(&report, folders, failures.len()));
     let mut files = render(&report, &pages, session)?;
     files.push((METHODS.to_owned(), methods.markdown().into_bytes()));
     files.extend(stiffness_table(rows, folders));
+    files.extend(fabric_table);
     files.extend(views);
     let source = Source {
         recipe,
@@ -277,8 +285,22 @@ fn stiffness_table(rows: &[Row], folders: &Folders) -> Option<(String, Vec<u8>)>
     })
 }
 
+/// `fabric_fit.csv` and its note, where enough scans have a stiffness and a fabric.
+fn fabric_fit(folders: &Folders) -> Option<((String, Vec<u8>), String)> {
+    let of = |(_, folder): (&str, Option<&Folder>)| {
+        crate::record::stiffness::record(&folder?.dir.join(RECORD))
+    };
+    let records: Vec<_> = folders.scans().filter_map(of).collect();
+    let lines = self::stiffness::fabric_fit(&records)?;
+    let words = self::stiffness::fit_in_words(&lines);
+    let table = table::to_csv(&lines).into_bytes();
+    Some((("fabric_fit.csv".to_owned(), table), words))
+}
+
 /// Tidy tables of results.
-const TABLES: [&str; 7] = [
+const TABLES: [&str; 9] = [
+    IN_VIVO,
+    LABELS,
     "curve.csv",
     "fracture.csv",
     REACTIONS,

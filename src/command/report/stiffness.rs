@@ -3,6 +3,7 @@
 use crate::record::stiffness::StiffnessRecord;
 use crate::report::cells::{Cell, Table, number, text};
 use crate::report::html::ShownStiffness;
+use crate::result::statistics::fabric_elasticity::{FabricFitLine, Tensor, fit};
 
 /// Matrix and orthotropic constants of `stiffness.json`.
 pub fn shown(record: &StiffnessRecord) -> ShownStiffness {
@@ -18,6 +19,57 @@ pub fn shown(record: &StiffnessRecord) -> ShownStiffness {
         matrix: Table::new(&head, body.collect()),
         constants: constants(record),
     }
+}
+
+/// What the law of Zysset and Curnier has of these tensors; of the conditions that most of them share. None where it has no fit.
+pub fn fabric_fit(records: &[StiffnessRecord]) -> Option<Vec<FabricFitLine>> {
+    let of = |conditions: &str| -> Vec<Tensor> {
+        let same = records
+            .iter()
+            .filter(|r| r.boundary_conditions == conditions);
+        same.filter_map(|record| {
+            let own = record.orthotropic.as_ref()?;
+            Some(Tensor {
+                bv_tv: record.bv_tv,
+                mil_mm: record.mil_mm?,
+                young_mpa: own.young_mpa,
+                shear_mpa: own.shear_mpa,
+                poisson: own.poisson,
+            })
+        })
+        .collect()
+    };
+    let conditions = records.iter().map(|r| r.boundary_conditions.as_str());
+    let all: Vec<(&str, Vec<Tensor>)> = conditions.map(|c| (c, of(c))).collect();
+    let (conditions, tensors) = all.iter().max_by_key(|(_, tensors)| tensors.len())?;
+    fit(tensors, conditions)
+}
+
+/// The fit in a sentence.
+pub fn fit_in_words(lines: &[FabricFitLine]) -> String {
+    let one = |l: &FabricFitLine| {
+        let unit = if l.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {}", l.unit)
+        };
+        format!(
+            "{} {:.4}{unit} (95 % {:.4} to {:.4})",
+            l.parameter, l.value, l.low, l.high
+        )
+    };
+    let words: Vec<String> = lines.iter().map(one).collect();
+    let Some(first) = lines.first() else {
+        return String::new();
+    };
+    format!(
+        "Zysset-Curnier law of {} tensors under {}: {}; R² {:.3} of the logarithms, scatter {:.0} % (fabric_fit.csv)",
+        first.scans,
+        first.conditions,
+        words.join(", "),
+        first.r2,
+        first.scatter_percent
+    )
 }
 
 /// Empty where the matrix is not positive definite.
@@ -39,6 +91,9 @@ fn constants(record: &StiffnessRecord) -> Table {
         .zip(o.axes)
     {
         body.push(vec![text(name), text(&format!("{x:.3}, {y:.3}, {z:.3}"))]);
+    }
+    if let Some(place) = &record.plausible {
+        body.push(vec![text("among published tensors"), text(&place.in_words)]);
     }
     let share = format!("{:.1} %", 100.0 * o.residual);
     body.push(vec![

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::physics::plasticity::Plasticity;
 use crate::pipeline::apparent::fields::Field;
-use crate::pipeline::apparent::params::{CoarsenBy, Load, Method, SolveParams};
+use crate::pipeline::apparent::params::{CoarsenBy, Ends, Load, Method, SolveParams};
 use crate::result::settings::Motion;
 
 impl SolveParams {
@@ -51,6 +51,8 @@ impl SolveParams {
             }
         }
         check_motion(self)?;
+        check_labels(self)?;
+        check_uneven(self)?;
         for (key, factor) in [
             ("solve.refine", self.refine),
             ("solve.coarsen", self.coarsen),
@@ -158,6 +160,13 @@ fn check_plasticity(params: &SolveParams) -> Result<()> {
             "add --method voxel-fe, or leave --plasticity out",
         );
     }
+    if params.load == Load::Labels {
+        return wrong(
+            "solve.plasticity",
+            "supports by label are of elastic tissue",
+            "leave --plasticity out, or load the ends (uniaxial, confined, shear)",
+        );
+    }
     if params.load.is_by_angle() || params.load == Load::Stiffness {
         return wrong(
             "solve.plasticity",
@@ -195,6 +204,114 @@ fn check_plasticity(params: &SolveParams) -> Result<()> {
             "solve.fields",
             "stresses and energy densities are written of elastic tissue only",
             "ask for displacement, strain, principal-strain, nodal-force or plastic-strain",
+        );
+    }
+    Ok(())
+}
+
+/// Refuses uneven ends that do not fit the other settings.
+///
+/// # Errors
+/// A depth below 0, another method, loads without ends, grips, tissue that yields, statistics of plane sections.
+fn check_uneven(params: &SolveParams) -> Result<()> {
+    let depth = params.ends_depth_mm;
+    if depth == 0.0 {
+        return Ok(());
+    }
+    let wrong =
+        |found: String, advice: &str| Err(Error::setting("solve.ends_depth_mm", found, advice));
+    if !(depth > 0.0 && depth.is_finite()) {
+        return wrong(
+            format!("not usable: {depth}"),
+            "give a depth in mm above 0, or leave it out",
+        );
+    }
+    if params.method != Method::VoxelFe {
+        let found = format!(
+            "uneven ends are of voxel elements, and the method is {}",
+            params.method.name()
+        );
+        return wrong(
+            found,
+            "add --method voxel-fe, or cut the ends flat (segment --plane-cut)",
+        );
+    }
+    if matches!(params.load.motion(), None | Some(Motion::ByLabel)) || params.load == Load::Confined
+    {
+        let found = format!(
+            "load {} has no ends that a platen touches",
+            params.load.name()
+        );
+        return wrong(
+            found,
+            "use --load uniaxial, shear, bending or torsion, or leave --ends-depth out",
+        );
+    }
+    if params.grip_mm > 0.0 {
+        let found =
+            "grips hold the outer layers, a depth the bone that is seen from outside".to_owned();
+        return wrong(found, "give --grip-mm or --ends-depth");
+    }
+    if params.coarsen > 1 && params.coarsen_by == CoarsenBy::Fraction {
+        let found = "elements that are partly bone show no surface".to_owned();
+        return wrong(found, "use --coarsen-by threshold, or leave --coarsen out");
+    }
+    if params.plasticity.is_some() || params.statistics {
+        let found = "load steps and sections are taken between plane ends".to_owned();
+        return wrong(
+            found,
+            "leave --plasticity and --statistics out, or cut the ends flat (segment --plane-cut)",
+        );
+    }
+    Ok(())
+}
+
+/// Refuses supports by label that do not fit the other settings.
+///
+/// # Errors
+/// Another load or method, nothing that loads, settings of ends.
+fn check_labels(params: &SolveParams) -> Result<()> {
+    let wrong = |key: &str, found: &str, advice: &str| Err(Error::setting(key, found, advice));
+    if params.load != Load::Labels {
+        return match (params.names_labels(), &params.supports) {
+            (true, _) => wrong(
+                "solve.load",
+                &format!(
+                    "labels are held, moved or pushed, and load {} moves ends",
+                    params.load.name()
+                ),
+                "leave --load out (in a recipe: load = \"labels\"), or leave --held, --moved, --pushed out",
+            ),
+            (false, Some(_)) => wrong(
+                "solve.supports",
+                "a label image is given, and no label is held, moved or pushed",
+                "add --held LABEL and --moved LABEL:ux,uy,uz or --pushed LABEL:fx,fy,fz",
+            ),
+            (false, None) => Ok(()),
+        };
+    }
+    if params.method != Method::VoxelFe {
+        return wrong(
+            "solve.load",
+            &format!(
+                "supports by label stand on the corners of voxels, which {} does not have",
+                params.method.name()
+            ),
+            "add --method voxel-fe",
+        );
+    }
+    if params.moved.is_empty() && params.pushed.is_empty() {
+        return wrong(
+            "solve.moved",
+            "no label is moved or pushed: nothing loads the bone",
+            "add --moved LABEL:ux,uy,uz (mm) or --pushed LABEL:fx,fy,fz (N)",
+        );
+    }
+    if params.grip_mm > 0.0 || params.ends != Ends::Free {
+        return wrong(
+            "solve.ends",
+            "grips and bonded ends are of loads that move ends; labels say themselves what is held",
+            "leave --grip-mm and --ends out",
         );
     }
     Ok(())

@@ -5,12 +5,14 @@ pub mod precondition;
 pub mod steps;
 pub mod yielded;
 
+use crate::discretisation::voxels::VoxelMesh;
 use crate::error::Result;
 use crate::measure::apparent::EndWork;
 use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
 use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::yielded::{Kept, Yielded};
+use crate::pipeline::apparent::ends::by_label::ByLabel;
 use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
@@ -97,6 +99,15 @@ pub trait Discretisation: Sized {
 /// Calls what it is given with each site of the ends, and its place in mm.
 pub type EachEndSite<'a> = Box<dyn Fn(&mut dyn FnMut(usize, End, [f64; 3])) + 'a>;
 
+/// Supports and loads on the labels of an image, and the mesh whose nodes have them.
+#[derive(Clone, Copy)]
+pub struct LabelSupports<'a> {
+    /// Which nodes do what.
+    pub by: &'a ByLabel,
+    /// Elements with their nodes.
+    pub mesh: &'a VoxelMesh,
+}
+
 /// The ends of a discretised specimen.
 pub struct EndSites<'a> {
     /// How they move.
@@ -147,6 +158,8 @@ pub struct System<'a, O, C, G> {
     pub start: Box<dyn Fn(usize) -> Displacements + 'a>,
     /// The sites at both ends and how they move.
     pub ends: EndSites<'a>,
+    /// What is on the labels of an image in place of ends; None: ends.
+    pub by_label: Option<LabelSupports<'a>>,
     /// How the body is loaded until it yields; None where nothing can yield.
     pub load_steps: Option<LoadSteps<'a>>,
     /// Sites or elements that carry load; 0 where the supports are not connected.

@@ -1,5 +1,6 @@
 //! Owns equilibrium: the one way in which every system of equations is solved.
 
+use crate::operator::held::Outside;
 use crate::operator::{Functional, MixedPrecision};
 use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::{Displacements, System};
@@ -22,15 +23,22 @@ pub fn equilibrium<'a, O: MixedPrecision, C: Precondition, G: Functional<3>>(
     let multigrid = system.coarsen.precondition(&system.held, &system.multigrid);
     loads.iter().map(move |&load| {
         let mut u = (system.start)(load);
+        let outside = Outside {
+            held: &system.held,
+            forces: system.by_label.and_then(|l| l.by.forces()),
+        };
         let info = minimise_or_fall_back(
             system.operator,
-            &system.held,
+            outside,
             &multigrid,
             &mut u,
             &cg,
             system.goal.as_ref(),
             |step| observe(load, step),
         );
+        if let Some(labels) = system.by_label {
+            labels.by.settle(labels.mesh, &mut u);
+        }
         (load, u, info)
     })
 }

@@ -182,7 +182,10 @@ impl<D: Discretisation> Solve for Of<D> {
             Motion::Along => model.assess(&elastic),
             _ => Moduli::NONE,
         };
-        let mut work = motion.work(&moduli, &info);
+        let mut work = match system.by_label {
+            Some(labels) => labels.by.work(&info),
+            None => motion.work(&moduli, &info),
+        };
         // A mechanism bears nothing that could yield.
         let yielded = match (&system.load_steps, info.ended) {
             (Some(load), Ended::EnergyTolerance | Ended::ResidualTolerance) => {
@@ -200,7 +203,15 @@ impl<D: Discretisation> Solve for Of<D> {
             },
         };
         let mut recorded = model.fields(prepared, params, &end, &work)?;
-        recorded.details.ends = reactions(motion, *planes_mm, end.force, each).to_vec();
+        match system.by_label {
+            None => {
+                recorded.details.ends = reactions(motion, *planes_mm, end.force, each).to_vec();
+            }
+            Some(labels) => {
+                recorded.details.labels = labels.by.table(labels.mesh, end.u, end.force);
+                recorded.note = labels.by.note();
+            }
+        }
         let iterations = info.iterations + yielded.as_ref().map_or(0, |y| y.iterations);
         let yielding = yielded.map(|y| y.yielding);
         if let Some(y) = &yielding {

@@ -49,7 +49,10 @@ use crate::volume::Specimen;
 #[doc(hidden)]
 pub use discretisation::Discretisation;
 pub use fields::Field;
-pub use params::{CoarsenBy, Conditions, Ends, Load, LoadSteps, Method, Sed, SolveParams};
+pub use params::{
+    CoarsenBy, Conditions, Ends, HeldLabel, Load, LoadSteps, Method, MovedLabel, PushedLabel, Sed,
+    SolveParams,
+};
 
 /// The solves that the settings name, in the order of their rows.
 #[doc(hidden)]

@@ -6,9 +6,13 @@ use crate::measure::pistoia::Pistoia;
 use crate::physics::material::Material;
 use crate::physics::plasticity::Plasticity;
 use crate::pipeline::apparent::fields::Field;
+pub use crate::result::settings::by_label::{HeldLabel, MovedLabel, PushedLabel};
 pub use crate::result::settings::load_steps::LoadSteps;
 pub use crate::result::settings::{Conditions, Ends, Load, Method, Sed};
+use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use std::sync::Arc;
 
 /// What becomes of a block of voxels that one element covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
@@ -19,6 +23,45 @@ pub enum CoarsenBy {
     Threshold,
     /// An element whose modulus is that of bone times its bone fraction.
     Fraction,
+}
+
+/// A label image of the settings: its file, and its labels once they were read.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(from = "PathBuf", into = "PathBuf")]
+pub struct LabelImage {
+    /// The file.
+    pub path: PathBuf,
+    /// None before it was read.
+    pub laid: Option<Arc<Laid>>,
+}
+
+/// Labels on the voxels of a specimen.
+#[derive(Debug)]
+pub struct Laid {
+    /// Of the file.
+    pub blake3: String,
+    /// One a voxel of the specimen; 0 is none.
+    pub labels: Volume<i32>,
+}
+
+impl From<PathBuf> for LabelImage {
+    fn from(path: PathBuf) -> Self {
+        LabelImage { path, laid: None }
+    }
+}
+
+impl From<LabelImage> for PathBuf {
+    fn from(image: LabelImage) -> Self {
+        image.path
+    }
+}
+
+impl PartialEq for LabelImage {
+    /// The same file; of two that were read, with the same contents.
+    fn eq(&self, other: &Self) -> bool {
+        let read = self.laid.as_ref().zip(other.laid.as_ref());
+        self.path == other.path && read.is_none_or(|(a, b)| a.blake3 == b.blake3)
+    }
 }
 
 /// Settings of `solve`.
@@ -43,8 +86,23 @@ pub struct SolveParams {
     pub strain: f64,
     /// Thickness of each grip; 0: the end planes.
     pub grip_mm: f64,
+    /// voxel-fe: grips the bone that is seen from each end plane down to this depth; 0: the end planes.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub ends_depth_mm: f64,
     /// What is done to the specimen.
     pub load: Load,
+    /// load = "labels": labels that are held, as `LABEL[:xyz]`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub held: Vec<HeldLabel>,
+    /// Labels that are displaced, as `LABEL:ux,uy,uz` in mm.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub moved: Vec<MovedLabel>,
+    /// Labels that a force acts on, as `LABEL:fx,fy,fz` in N.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pushed: Vec<PushedLabel>,
+    /// The image of those labels, on the scan's grid. None: the scan's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub supports: Option<LabelImage>,
     /// Bending and torsion: by how many degrees the ends turn against each other.
     pub angle_deg: f64,
     /// Uniaxial loads; other loads hold the ends in all components.
@@ -85,6 +143,10 @@ pub struct SolveParams {
     pub statistics: bool,
 }
 
+fn is_zero(v: &f64) -> bool {
+    *v == 0.0
+}
+
 impl Default for SolveParams {
     fn default() -> Self {
         SolveParams {
@@ -96,7 +158,12 @@ impl Default for SolveParams {
             steps: LoadSteps::default(),
             strain: -0.01,
             grip_mm: 0.0,
+            ends_depth_mm: 0.0,
             load: Load::Uniaxial,
+            held: Vec::new(),
+            moved: Vec::new(),
+            pushed: Vec::new(),
+            supports: None,
             angle_deg: 1.0,
             ends: Ends::Free,
             conditions: Conditions::Kinematic,
@@ -123,6 +190,44 @@ impl SolveParams {
     /// Whether grey values of the scan are needed in addition to its mask.
     pub fn needs_grey(&self) -> bool {
         self.material.is_some() || self.method != Method::Lattice || self.needs_labels()
+    }
+
+    /// Whether labels of an image are held, moved or pushed.
+    pub fn names_labels(&self) -> bool {
+        !(self.held.is_empty() && self.moved.is_empty() && self.pushed.is_empty())
+    }
+
+    /// Supports and loads by label in a line, with the file of the labels, or uneven ends. None for plane ends.
+    pub fn supports_in_words(&self) -> Option<String> {
+        if self.ends_depth_mm > 0.0 {
+            let depth = self.ends_depth_mm;
+            return Some(format!("bone seen from the ends to a depth of {depth} mm"));
+        }
+        if self.load != Load::Labels {
+            return None;
+        }
+        let said = |role: &str, all: Vec<String>| match all.is_empty() {
+            true => None,
+            false => Some(format!("{role} {}", all.join(" "))),
+        };
+        let image = self.supports.as_ref().map(|image| {
+            let name = image.path.file_name().unwrap_or_default().to_string_lossy();
+            let hash = image.laid.as_ref().map_or("", |laid| &laid.blake3);
+            format!("labels of {name} (blake3 {})", &hash[..hash.len().min(16)])
+        });
+        let parts = [
+            said("held", self.held.iter().map(ToString::to_string).collect()),
+            said(
+                "moved",
+                self.moved.iter().map(ToString::to_string).collect(),
+            ),
+            said(
+                "pushed",
+                self.pushed.iter().map(ToString::to_string).collect(),
+            ),
+            image,
+        ];
+        Some(parts.into_iter().flatten().collect::<Vec<_>>().join("; "))
     }
 
     /// Whether labels of the scan are read where it has some.

@@ -114,10 +114,11 @@ impl SolveParams {
             supports: match self.load.motion() {
                 None => Supports::Faces(self.conditions),
                 Some(Motion::Along) => Supports::Ends(self.ends),
+                Some(Motion::ByLabel) => Supports::Labels,
                 Some(_) => Supports::Ends(Ends::Bonded),
             },
             axis: self.axis,
-            strain: match self.load.is_by_angle() {
+            strain: match self.load.is_by_angle() || self.load == Load::Labels {
                 true => 0.0,
                 false => self.strain,
             },
@@ -129,6 +130,7 @@ impl SolveParams {
             tolerance: Some(self.tolerance),
             plasticity: self.plasticity.as_ref().map(Plasticity::words),
             steps: self.plasticity.as_ref().map(|_| self.steps),
+            held_by: self.supports_in_words(),
             sed: (self.method != Method::Lattice && self.load != Load::Stiffness)
                 .then_some(self.sed),
             ..Settings::default()

@@ -158,6 +158,36 @@ pub fn segment_measured<'a>(
     })
 }
 
+/// Labels on the scan's grid, brought to the specimen's as the scan was: cropped, turned, resampled, rotated, its ends cut.
+///
+/// # Errors
+/// Labels on another grid than the scan's.
+#[doc(hidden)]
+pub fn labels_like(
+    labels: &Volume<f32>,
+    params: &SegmentParams,
+    summary: &SegmentSummary,
+) -> Result<Volume<f32>> {
+    let followed = SegmentParams {
+        labels: vec![1],
+        otsu: false,
+        lower: None,
+        upper: None,
+        voi: Voi::Box,
+        align: summary.rotation.map(|r| Align::Direction(r.direction)),
+        ..params.clone()
+    };
+    let placed = place(labels, &followed, None)?;
+    let Some(cut_mm) = summary.plane_cut_mm else {
+        return Ok(placed.scan.into_owned());
+    };
+    let Grid { n, spacing_mm } = placed.scan.grid;
+    let [first, last] = cut_mm.map(|mm| (mm / spacing_mm[2]).round() as usize);
+    Ok(placed
+        .scan
+        .cropped(&[[0, n[0]], [0, n[1]], [first, n[2] - last]]))
+}
+
 /// Bone in the volume of interest, and what was left out.
 struct Found {
     bone: Volume<u8>,

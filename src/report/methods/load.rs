@@ -33,21 +33,25 @@ fn load(c: &Condition) -> String {
     let Some(motion) = c.load.motion() else {
         let faces = match c.supports {
             Supports::Faces(conditions) => conditions,
-            Supports::Ends(_) => Conditions::default(),
+            Supports::Ends(_) | Supports::Labels => Conditions::default(),
         };
         return format!(
             "The apparent stiffness matrix followed from six unit strains under {}. E_app is Young's modulus along {axis} of that matrix.",
             faces_in_words(faces)
         );
     };
-    let grips = match c.grip_mm > 0.0 {
-        true => Some(setting(c.grip_mm)),
-        false => None,
+    let grips = match (c.grip_mm > 0.0, &c.held_by) {
+        (true, _) => Some(format!("the outer {} mm", setting(c.grip_mm))),
+        (false, held) => held.clone(),
     };
     let angle = c.angle_deg.unwrap_or_default();
     let share = setting(100.0 * c.strain.abs());
     match motion {
         Motion::Along => along(c, grips.as_deref()),
+        Motion::ByLabel => format!(
+            "Nodes at the corners of labelled voxels were held, moved or pushed: {} (displacements in mm; forces in N, spread evenly over the nodes of a label).",
+            c.held_by.as_deref().unwrap_or_default()
+        ),
         Motion::Sideways(direction) => held(
             &format!(
                 "Specimens were sheared: the upper end moved along {} by {share} % of the height along {axis}",
@@ -75,7 +79,7 @@ fn load(c: &Condition) -> String {
 
 fn held(motion: &str, grips: Option<&str>) -> String {
     let ends = match grips {
-        Some(mm) => format!("the outer {mm} mm at both ends were held in all components"),
+        Some(what) => format!("{what} at both ends were held in all components"),
         None => "both end planes were held in all components".to_owned(),
     };
     format!("{motion}; {ends}; the sides were free.")
@@ -87,7 +91,7 @@ fn along(c: &Condition, grips: Option<&str>) -> String {
         false => "stretched",
     };
     let ends = match grips {
-        Some(mm) => format!("the outer {mm} mm at each end moved as one along the axis"),
+        Some(what) => format!("{what} at each end moved as one along the axis"),
         None => "the end planes moved along the axis".to_owned(),
     };
     let sideways = match c.supports {

@@ -103,6 +103,8 @@ pub(super) struct Columns {
     max_stress_error_mpa: Option<f64>,
     #[serde(default)]
     model_bv_tv: Option<f64>,
+    #[serde(default)]
+    supports: Option<String>,
 }
 
 impl From<Row> for Columns {
@@ -176,6 +178,7 @@ impl From<Row> for Columns {
             yield_stress_error_mpa: solved.strength.yield_stress_error_mpa,
             max_stress_error_mpa: solved.strength.max_stress_error_mpa,
             model_bv_tv: solved.model_bv_tv,
+            supports: key.held_by,
         }
     }
 }
@@ -212,6 +215,7 @@ impl TryFrom<Columns> for Row {
             sed: c.sed,
             plasticity: c.plasticity,
             steps: c.steps,
+            held_by: c.supports,
         };
         let solved = Solution {
             sites: c.sites,

@@ -3,6 +3,7 @@
 
 pub mod agreement;
 pub mod anova;
+pub mod fabric_elasticity;
 pub mod holm;
 pub mod mann_whitney;
 pub mod quartiles;

@@ -1,12 +1,12 @@
 //! Owns conjugate gradients in double precision.
 
 use super::{CgInfo, CgParams, CgStep, State, Vectors, are_positive, iterate};
-use crate::operator::held::{Constrained, Held};
+use crate::operator::held::{Constrained, Outside};
 use crate::operator::{Functional, Operator, Preconditioner};
 use crate::par::{CHUNK, dot};
 use rayon::prelude::*;
 
-/// Minimises `½ uᵀAu` over the unknowns that are not held, starting from (and keeping the held values of) `u`.
+/// Minimises `½ uᵀAu − fᵀu` over the unknowns that are not held, starting from (and keeping the held values of) `u`.
 ///
 /// The energy is what prescribed displacements minimise, so its error is the squared energy norm of the algebraic
 /// error, which conjugate gradients estimates from its own coefficients ([`EnergyTail`](crate::solver::cg::error::EnergyTail)).
@@ -14,9 +14,9 @@ use rayon::prelude::*;
 /// Where a `goal` is wanted instead of the energy, it is found to the same accuracy. Iteration `j` changes it by
 /// `α_j J(p_j)`, exactly; what later iterations will change it by is estimated from the sizes of the past changes
 /// ([`goal_estimate`](crate::solver::cg::error::EnergyTail::goal_estimate)). Their signs may differ, so this errs on the safe side.
-pub fn minimise<F: Functional<D>, const D: usize>(
+pub fn minimise<'a, F: Functional<D>, const D: usize>(
     operator: &impl Operator<D>,
-    held: &Held,
+    outside: impl Into<Outside<'a, D>>,
     preconditioner: &impl Preconditioner<D>,
     u: &mut [[f64; D]],
     params: &CgParams,
@@ -24,7 +24,9 @@ pub fn minimise<F: Functional<D>, const D: usize>(
     observe: impl FnMut(CgStep),
 ) -> CgInfo {
     let room = || vec![[0.0; D]; operator.sites()];
+    let Outside { held, forces } = outside.into();
     let vectors = Double {
+        forces,
         operator: Constrained {
             inner: operator,
             held,
@@ -41,6 +43,7 @@ pub fn minimise<F: Functional<D>, const D: usize>(
 
 struct Double<'a, O, P, const D: usize> {
     operator: Constrained<'a, O, D>,
+    forces: Option<&'a [[f64; D]]>,
     preconditioner: &'a P,
     r: Vec<[f64; D]>,
     z: Vec<[f64; D]>,
@@ -61,10 +64,15 @@ impl<O: Operator<D>, P: Preconditioner<D>, const D: usize> Vectors<D> for Double
     fn residual(&mut self, u: &[[f64; D]], _: f64) -> State {
         self.operator.inner.apply(u, &mut self.r);
         let energy = dot(u, &self.r);
+        let work = self.forces.map_or(0.0, |forces| dot(u, forces));
+        if let Some(forces) = self.forces {
+            subtract(&mut self.r, forces);
+        }
         self.operator.held.clear(&mut self.r);
         negate(&mut self.r);
         State {
-            energy,
+            energy: energy - 2.0 * work,
+            work,
             norm: dot(&self.r, &self.r).sqrt(),
         }
     }
@@ -96,6 +104,22 @@ impl<O: Operator<D>, P: Preconditioner<D>, const D: usize> Vectors<D> for Double
     fn along(&self, goal: &impl Functional<D>) -> f64 {
         goal.of(&self.p)
     }
+
+    fn work_along(&self) -> f64 {
+        self.forces.map_or(0.0, |forces| dot(&self.p, forces))
+    }
+
+    fn is_forced(&self) -> bool {
+        self.forces.is_some()
+    }
+}
+
+/// `r −= f`.
+fn subtract<const D: usize>(r: &mut [[f64; D]], f: &[[f64; D]]) {
+    r.par_iter_mut()
+        .with_min_len(CHUNK)
+        .zip(f)
+        .for_each(|(r, f)| (0..D).for_each(|c| r[c] -= f[c]));
 }
 
 fn negate<const D: usize>(r: &mut [[f64; D]]) {

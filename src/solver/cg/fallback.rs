@@ -1,7 +1,7 @@
 //! Owns the choice of precision, and what to do when one does not suffice or a preconditioner is found not to be positive:
 //! carry on in double precision, then with the diagonal.
 
-use crate::operator::held::{Constrained, Held};
+use crate::operator::held::{Constrained, Held, Outside};
 use crate::operator::{Functional, MixedPrecision, SinglePreconditioner};
 use crate::solver::cg;
 use crate::solver::cg::jacobi::Jacobi;
@@ -27,15 +27,17 @@ const SOFT_RESIDUAL: f64 = 0.1;
 /// [`mixed::minimise`], or conjugate gradients in double precision where stiffness differs by more than 1e4 or the former
 /// breaks down; should `preconditioner` break down, too, from where it came to with the diagonal. Iterations are those of
 /// all.
-pub fn minimise_or_fall_back<F: Functional<3>>(
+pub fn minimise_or_fall_back<'a, F: Functional<3>>(
     operator: &impl MixedPrecision,
-    held: &Held,
+    outside: impl Into<Outside<'a, 3>>,
     preconditioner: &impl SinglePreconditioner<3>,
     u: &mut [[f64; 3]],
     params: &CgParams,
     goal: Option<&F>,
     mut observe: impl FnMut(CgStep),
 ) -> CgInfo {
+    let outside = outside.into();
+    let held = outside.held;
     let mut done = None;
     let mut params = *params;
     let spread = spread(operator, held);
@@ -44,7 +46,7 @@ pub fn minimise_or_fall_back<F: Functional<3>>(
     } else {
         let info = mixed::minimise(
             operator,
-            held,
+            outside,
             preconditioner,
             u,
             &params,
@@ -58,7 +60,7 @@ pub fn minimise_or_fall_back<F: Functional<3>>(
     }
     let widened = Widened::new(preconditioner, operator.sites());
     let left = left_of(&params, done.as_ref());
-    let info = cg::minimise(operator, held, &widened, u, &left, goal, |step| {
+    let info = cg::minimise(operator, outside, &widened, u, &left, goal, |step| {
         observe(after(done.as_ref(), step));
     });
     let info = joined(done, info);
@@ -73,7 +75,7 @@ pub fn minimise_or_fall_back<F: Functional<3>>(
         trusted_residual: TRUSTED_RESIDUAL / info.residual,
         ..left_of(&params, Some(&info))
     };
-    let last = cg::minimise(operator, held, &diagonal, u, &left, goal, |step| {
+    let last = cg::minimise(operator, outside, &diagonal, u, &left, goal, |step| {
         observe(after(Some(&info), step));
     });
     joined(Some(info), last)

@@ -7,13 +7,14 @@
 
 use super::single::{Single, advance, combine, dot, image, narrow, scale};
 use super::{CgInfo, CgParams, CgStep, State, Vectors, are_positive, iterate};
-use crate::operator::held::Held;
+use crate::operator::held::{Held, Outside};
 use crate::operator::{Functional, MixedPrecision, SinglePreconditioner};
+use crate::par;
 
 /// As [`crate::solver::cg::minimise`].
-pub fn minimise<F: Functional<3>>(
+pub fn minimise<'a, F: Functional<3>>(
     operator: &impl MixedPrecision,
-    held: &Held,
+    outside: impl Into<Outside<'a, 3>>,
     preconditioner: &impl SinglePreconditioner<3>,
     u: &mut [[f64; 3]],
     params: &CgParams,
@@ -21,9 +22,11 @@ pub fn minimise<F: Functional<3>>(
     observe: impl FnMut(CgStep),
 ) -> CgInfo {
     let room = || vec![[0f32; 3]; operator.sites()];
+    let Outside { held, forces } = outside.into();
     let mut vectors = Mixed {
         operator,
         held,
+        forces,
         preconditioner,
         unit: 1.0,
         r: room(),
@@ -39,6 +42,7 @@ pub fn minimise<F: Functional<3>>(
 struct Mixed<'a, O, P> {
     operator: &'a O,
     held: &'a Held,
+    forces: Option<&'a [[f64; 3]]>,
     preconditioner: &'a P,
     unit: f64,
     r: Single,
@@ -57,7 +61,7 @@ impl<O: MixedPrecision, P: SinglePreconditioner<3>> Vectors<3> for Mixed<'_, O, 
         self.unit
     }
 
-    /// `r = −(A u) / unit` in the free components, part by part from double precision.
+    /// `r = (f − A u) / unit` in the free components, part by part from double precision.
     fn residual(&mut self, u: &[[f64; 3]], factor: f64) -> State {
         let before = self.unit;
         self.unit *= factor;
@@ -73,7 +77,8 @@ impl<O: MixedPrecision, P: SinglePreconditioner<3>> Vectors<3> for Mixed<'_, O, 
                 for d in 0..3 {
                     energy += u[first + i][d] * f[d];
                     let free = !self.held.is_held(first + i, d);
-                    let v = if free { -f[d] } else { 0.0 };
+                    let outside = self.forces.map_or(0.0, |outside| outside[first + i][d]);
+                    let v = if free { outside - f[d] } else { 0.0 };
                     squared += v * v;
                     r[d] = narrow(v / unit);
                 }
@@ -81,8 +86,10 @@ impl<O: MixedPrecision, P: SinglePreconditioner<3>> Vectors<3> for Mixed<'_, O, 
             [energy, squared]
         };
         let [energy, squared] = self.operator.for_each_chunk(u, &mut self.r, consume);
+        let work = self.forces.map_or(0.0, |forces| par::dot(u, forces));
         State {
-            energy,
+            energy: energy - 2.0 * work,
+            work,
             norm: squared.sqrt(),
         }
     }
@@ -107,6 +114,21 @@ impl<O: MixedPrecision, P: SinglePreconditioner<3>> Vectors<3> for Mixed<'_, O, 
 
     fn along(&self, goal: &impl Functional<3>) -> f64 {
         goal.of_single(&self.p)
+    }
+
+    fn work_along(&self) -> f64 {
+        self.forces.map_or(0.0, |forces| {
+            par::sum_chunks(self.p.len(), |range| {
+                let pairs = forces[range.clone()].iter().zip(&self.p[range]);
+                pairs
+                    .map(|(f, p)| (0..3).map(|d| f[d] * f64::from(p[d])).sum::<f64>())
+                    .sum()
+            })
+        })
+    }
+
+    fn is_forced(&self) -> bool {
+        self.forces.is_some()
     }
 }
 

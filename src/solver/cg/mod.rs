@@ -1,5 +1,5 @@
-//! Owns preconditioned conjugate gradients for `minimise ½ uᵀ A u` under prescribed unknowns: the iterations and how they end, in any
-//! precision.
+//! Owns preconditioned conjugate gradients for `minimise ½ uᵀ A u − fᵀ u` under prescribed unknowns and forces: the iterations and how
+//! they end, in any precision.
 
 pub mod correction;
 mod double;
@@ -139,6 +139,12 @@ trait Vectors<const D: usize> {
 
     /// The goal of `p`.
     fn along(&self, goal: &impl Functional<D>) -> f64;
+
+    /// `fᵀp` of the forces; 0 without.
+    fn work_along(&self) -> f64;
+
+    /// Whether forces act.
+    fn is_forced(&self) -> bool;
 }
 
 /// Whether an iteration can be made with these.
@@ -155,6 +161,9 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
     mut observe: impl FnMut(CgStep),
 ) -> CgInfo {
     let start = vectors.residual(u, 1.0);
+    let forced = vectors.is_forced();
+    // Of forces; what is minimised is the elastic energy less twice that work.
+    let mut work = start.work;
     let whole = params.reference_energy.unwrap_or(start.energy);
     let mut tail = EnergyTail::default();
     let mut goal_value = goal.map(|goal| goal.of(u));
@@ -170,7 +179,7 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
         let rz = vectors.precondition();
         let unit = vectors.unit();
         if iterations > 0 {
-            let energy = expected(anchor, &tail);
+            let energy = expected(anchor, &tail) + 2.0 * work;
             let of_energy = tail.update(unit * unit * rz).map(|e| e / energy);
             let error = tail.with_goal(of_energy, goal_value);
             observe(CgStep {
@@ -193,6 +202,9 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
         };
         iterations += 1;
         tail.push(alpha, unit * unit * rz);
+        if forced {
+            work += unit * alpha * vectors.work_along();
+        }
         if let (Some(goal), Some(value)) = (goal, goal_value.as_mut()) {
             let change = unit * alpha * vectors.along(goal);
             *value += change;
@@ -203,15 +215,17 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
         if residual <= params.residual_tolerance {
             ended = Ended::ResidualTolerance;
         } else if V::EXACT {
-            if energy <= MECHANISM_ENERGY * whole {
+            if !forced && energy <= MECHANISM_ENERGY * whole {
                 ended = Ended::Mechanism;
             }
-        } else if norm < REPLACE || energy < REPLACE * anchor.0 {
+        } else if norm < REPLACE || !forced && energy < REPLACE * anchor.0 {
             let now = vectors.residual(u, norm);
-            ended = match checked(ended, energy, now.energy, anchor.0) {
-                _ if now.energy > RISE * anchor.0 => Ended::Breakdown,
+            work = now.work;
+            let risen = now.energy > anchor.0 + (RISE - 1.0) * anchor.0.abs();
+            ended = match checked(ended, energy, now.energy, anchor.0.abs()) {
+                _ if risen => Ended::Breakdown,
                 Ended::Breakdown => Ended::Breakdown,
-                _ if now.energy <= MECHANISM_ENERGY * whole => Ended::Mechanism,
+                _ if !forced && now.energy <= MECHANISM_ENERGY * whole => Ended::Mechanism,
                 _ if now.norm == 0.0 => Ended::ResidualTolerance,
                 goes_on => goes_on,
             };
@@ -219,7 +233,8 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
         }
     }
     let end = vectors.residual(u, 1.0);
-    ended = checked(ended, expected(anchor, &tail), end.energy, anchor.0);
+    ended = checked(ended, expected(anchor, &tail), end.energy, anchor.0.abs());
+    let energy = end.energy + 2.0 * end.work;
     CgInfo {
         ended,
         iterations,
@@ -228,9 +243,9 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
         } else {
             0.0
         },
-        energy: end.energy,
-        start_energy: start.energy,
-        energy_error: energy_error(ended, &tail, end.energy, start.norm),
+        energy,
+        start_energy: start.energy + 2.0 * start.work,
+        energy_error: energy_error(ended, &tail, energy, start.norm),
         goal_error: goal_value.map(|value| goal_error(ended, &tail, value, start.norm)),
     }
 }
@@ -270,8 +285,9 @@ fn goal_error(ended: Ended, tail: &EnergyTail, value: f64, start_norm: f64) -> f
     }
 }
 
-/// Of a displacement field: its energy `uᵀAu` and the norm of its residual.
+/// Of a displacement field: what is minimised, `uᵀAu − 2 fᵀu`, the work `fᵀu` of the forces, and the norm of its residual.
 struct State {
     energy: f64,
+    work: f64,
     norm: f64,
 }

@@ -54,6 +54,8 @@ impl EndMotion {
         let axis = self.axis.index();
         let mut u = [0.0; 3];
         match self.motion {
+            // Labels say what moves.
+            Motion::ByLabel => {}
             Motion::Along => u[axis] = self.loaded.displacement_mm * along,
             Motion::Sideways(direction) => {
                 u[direction.index()] = self.loaded.displacement_mm * along;
@@ -96,7 +98,7 @@ impl EndMotion {
                 let relative = moduli.algebraic_error_mpa / moduli.e_app_mpa;
                 EndWork::of_displacement(energy, displacement_mm, relative)
             }
-            Motion::Sideways(_) => {
+            Motion::ByLabel | Motion::Sideways(_) => {
                 EndWork::of_displacement(info.energy, self.loaded.displacement_mm, relative)
             }
             Motion::Turn => EndWork::of_turn(info.energy, self.turn, relative),
@@ -108,7 +110,7 @@ impl EndMotion {
     /// The component of a force on the upper end, or of its moment about the middle, that does the work.
     pub fn working(&self, force: [f64; 3], moment: [f64; 3]) -> f64 {
         match self.motion {
-            Motion::Along => force[self.axis.index()],
+            Motion::Along | Motion::ByLabel => force[self.axis.index()],
             Motion::Sideways(direction) => force[direction.index()],
             Motion::Turn => moment[self.axis.index()],
             Motion::Tilt(about) => moment[about.index()],

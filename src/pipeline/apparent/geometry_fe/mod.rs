@@ -188,6 +188,7 @@ impl Discretisation for GeometryModel {
                 LoadSet::UnitStrains(_) => supports::affine(self, mesh.size_mm, load),
             }),
             ends: self.ends(),
+            by_label: None,
             load_steps: None,
             sites: mesh.elements.len(),
             dropped: self.report.loaded.dropped_elements,

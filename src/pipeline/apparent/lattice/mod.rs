@@ -122,6 +122,7 @@ impl<'a> Placed<'a> {
             held: supports::held(&self, &motion, params.load),
             start: Box::new(move |_| supports::start(&self, &motion)),
             ends: self.ends(motion),
+            by_label: None,
             load_steps: None,
             sites: self.indices.len(),
             dropped: self.dropped,

@@ -10,6 +10,8 @@ use crate::physics::hex8::Hex8;
 use crate::physics::hex8::element::Integration;
 use crate::physics::hex8::heterogeneous::Heterogeneous;
 use crate::pipeline::apparent::discretisation::Prepared;
+use crate::pipeline::apparent::ends::label_image::LabelMap;
+use crate::pipeline::apparent::ends::uneven::Uneven;
 use crate::pipeline::apparent::params::{Load, SolveParams};
 use crate::pipeline::apparent::tissue::{Mixed, Tissue};
 use crate::volume::Specimen;
@@ -19,17 +21,21 @@ use std::ops::Range;
 pub(super) const LEAST_FRACTION: f32 = 0.02;
 
 /// Which elements carry load.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Keep {
+#[derive(Clone, Copy)]
+pub enum Keep<'a> {
     /// Those joined to both grips.
     BetweenGrips,
     /// Those joined to a face of the volume.
     AtFaces,
+    /// Those joined to these labels.
+    AtLabels(&'a LabelMap<'a>, &'a [i32]),
+    /// Those joined to what is seen of both ends.
+    Between(&'a Uneven),
 }
 
-impl Keep {
-    /// Those that a load needs.
-    pub fn under(load: Load) -> Keep {
+impl Keep<'_> {
+    /// Those that a load between ends, or on faces, needs.
+    pub fn under(load: Load) -> Keep<'static> {
         match load.motion() {
             None => Keep::AtFaces,
             Some(_) => Keep::BetweenGrips,
@@ -50,7 +56,7 @@ pub enum Bricks {
 impl Bricks {
     /// # Errors
     /// Grips that meet, too many nodes, or voxels far from cubes.
-    pub fn new(prepared: Prepared, params: &SolveParams, keep: Keep) -> Result<Self> {
+    pub fn new(prepared: Prepared, params: &SolveParams, keep: Keep<'_>) -> Result<Self> {
         let Prepared { specimen, tissue } = prepared;
         refuse_long_voxels(specimen.bone.grid)?;
         let solid = match tissue {
@@ -104,7 +110,7 @@ pub(super) fn rule(params: &SolveParams, poisson: f64) -> Integration {
 ///
 /// # Errors
 /// Grips that meet, or too many nodes.
-pub fn whole_mesh(specimen: &Specimen, params: &SolveParams, keep: Keep) -> Result<VoxelMesh> {
+pub fn whole_mesh(specimen: &Specimen, params: &SolveParams, keep: Keep<'_>) -> Result<VoxelMesh> {
     let refined = (params.refine > 1).then(|| resample::refine(&specimen.bone, params.refine));
     let bone = refined.as_ref().unwrap_or(&specimen.bone);
     mesh(bone.grid, bone.as_slice(), |b| *b != 0, params, keep)
@@ -135,7 +141,7 @@ fn of_mixed(
     specimen: &Specimen,
     mixed: &Mixed,
     params: &SolveParams,
-    keep: Keep,
+    keep: Keep<'_>,
 ) -> Result<Heterogeneous> {
     let kinds: Vec<(f64, Integration)> = mixed
         .poissons
@@ -177,7 +183,7 @@ fn mesh<T: Sync>(
     voxels: &[T],
     is_bone: impl Fn(&T) -> bool + Sync,
     params: &SolveParams,
-    keep: Keep,
+    keep: Keep<'_>,
 ) -> Result<VoxelMesh> {
     match keep {
         Keep::BetweenGrips => {
@@ -185,6 +191,11 @@ fn mesh<T: Sync>(
             VoxelMesh::new(grid, voxels, is_bone, grips)
         }
         Keep::AtFaces => VoxelMesh::at_faces(grid, voxels, is_bone),
+        Keep::AtLabels(map, labels) => {
+            let touches = |run, y, z| map.touches(run, y, z, labels);
+            VoxelMesh::joining(grid, voxels, is_bone, touches, touches)
+        }
+        Keep::Between(uneven) => uneven.mesh(grid, voxels, is_bone),
     }
 }
 

@@ -5,6 +5,7 @@ use crate::measure::pistoia::Failure;
 use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::params::SolveParams;
 use crate::result::details::FailureAt;
+use crate::result::settings::Motion;
 
 /// The one of the settings' own critical volume.
 pub fn chosen(failures: &[FailureAt], params: &SolveParams) -> Option<FailureAt> {
@@ -21,6 +22,7 @@ pub fn at(
 ) -> FailureAt {
     let factor = failure.factor;
     let by_angle = motion.motion.is_by_angle();
+    let by_ends = !by_angle && motion.motion != Motion::ByLabel;
     let labels: Vec<String> = params.failure_labels.iter().map(i32::to_string).collect();
     FailureAt {
         critical_volume: failure.criterion.critical_volume,
@@ -33,8 +35,8 @@ pub fn at(
         factor,
         failure_load_n: work.force_n.map(|f| factor * f),
         failure_moment_nmm: work.moment_nmm.map(|m| factor * m),
-        failure_displacement_mm: (!by_angle).then(|| factor * motion.loaded.displacement_mm.abs()),
-        failure_strain: (!by_angle).then(|| factor * params.strain.abs()),
+        failure_displacement_mm: by_ends.then(|| factor * motion.loaded.displacement_mm.abs()),
+        failure_strain: by_ends.then(|| factor * params.strain.abs()),
         failure_angle_deg: by_angle.then(|| factor * params.angle_deg.abs()),
     }
 }

@@ -21,12 +21,17 @@ use crate::operator::{Functional, MixedPrecision};
 use crate::par::sum_chunks;
 use crate::pipeline::apparent::discretisation::precondition::Precondition;
 use crate::pipeline::apparent::discretisation::{
-    Cost, Discretisation, EndSites, Known, LoadSet, LoadSteps, Places, Prepared, System,
+    Cost, Discretisation, EndSites, Known, LabelSupports, LoadSet, LoadSteps, Places, Prepared,
+    System,
 };
+use crate::pipeline::apparent::ends::by_label::{self, ByLabel};
+use crate::pipeline::apparent::ends::label_image::LabelMap;
 use crate::pipeline::apparent::ends::motion::EndMotion;
-use crate::pipeline::apparent::ends::supports;
+use crate::pipeline::apparent::ends::reactions::End;
+use crate::pipeline::apparent::ends::supports::{self, Nodes};
+use crate::pipeline::apparent::ends::uneven::Uneven;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
-use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::params::{Load, SolveParams};
 use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
@@ -46,6 +51,10 @@ pub struct VoxelModel {
     /// Values of a labelled scan, by voxel.
     labels: Option<Labels>,
     params: SolveParams,
+    /// What is on labels in place of ends.
+    by_label: Option<ByLabel>,
+    /// What is gripped of ends that are not plane.
+    uneven: Option<Uneven>,
     /// The specimen at its elements' resolution, where that is another mask than the scan's.
     resolved: Option<Specimen>,
 }
@@ -69,8 +78,68 @@ impl VoxelModel {
             motion: EndMotion::of(specimen, params, gauge_mm),
             labels: Labels::of(specimen, params)?,
             params: params.clone(),
+            by_label: None,
+            uneven: None,
             resolved: None,
         })
+    }
+
+    /// The model whose supports and loads are on labels.
+    fn on_labels(prepared: Prepared, params: &SolveParams) -> Result<Self> {
+        let map = LabelMap::of(prepared.specimen, params)?;
+        let loaded = by_label::loaded(params);
+        let keep = Keep::AtLabels(&map, &loaded);
+        let resolved = resolution::resolved(prepared.specimen, params)?;
+        let mut model = match &resolved {
+            None => VoxelModel::of(
+                Bricks::new(prepared, params, keep)?,
+                prepared.specimen,
+                params,
+            )?,
+            Some(specimen) => {
+                let own = resolution::one_element_a_voxel(params);
+                let finer = Prepared {
+                    specimen,
+                    ..prepared
+                };
+                VoxelModel::of(Bricks::new(finer, &own, keep)?, specimen, &own)?
+            }
+        };
+        model.by_label = Some(ByLabel::of(model.bricks.mesh(), &map, params)?);
+        model.resolved = resolved;
+        Ok(model)
+    }
+
+    /// The model between ends that are gripped where bone is seen from the end planes.
+    fn between_uneven_ends(prepared: Prepared, params: &SolveParams) -> Result<Self> {
+        let resolved = resolution::resolved(prepared.specimen, params)?;
+        let own = match &resolved {
+            Some(_) => resolution::one_element_a_voxel(params),
+            None => params.clone(),
+        };
+        let specimen = resolved.as_ref().unwrap_or(prepared.specimen);
+        let (bone, depth) = (&specimen.bone, params.ends_depth_mm);
+        let uneven = Uneven::of(bone, params.axis, depth, own.refine)?;
+        let finer = Prepared {
+            specimen,
+            ..prepared
+        };
+        let bricks = Bricks::new(finer, &own, Keep::Between(&uneven))?;
+        let mut model = VoxelModel::of(bricks, specimen, &own)?;
+        model.uneven = Some(uneven);
+        model.resolved = resolved;
+        Ok(model)
+    }
+
+    /// Force of the supports on the upper end, along an axis.
+    fn upper_force(&self, force: &[[f64; 3]], axis: usize) -> f64 {
+        let mut sum = 0.0;
+        self.gripped().each(|node, at| {
+            if at.end == Some(End::Upper) {
+                sum += force[node][axis];
+            }
+        });
+        sum
     }
 
     /// Two coarse cycles halve the iterations on bricks.
@@ -85,6 +154,7 @@ impl VoxelModel {
         Gripped {
             mesh: self.bricks.mesh(),
             grips: self.grips,
+            uneven: self.uneven.as_ref(),
         }
     }
 
@@ -135,6 +205,12 @@ impl Discretisation for VoxelModel {
     }
 
     fn build(_: &(), prepared: Prepared, params: &SolveParams) -> Result<Self> {
+        if params.load == Load::Labels {
+            return VoxelModel::on_labels(prepared, params);
+        }
+        if params.ends_depth_mm > 0.0 {
+            return VoxelModel::between_uneven_ends(prepared, params);
+        }
         let keep = Keep::under(params.load);
         let Some(resolved) = resolution::resolved(prepared.specimen, params)? else {
             let bricks = Bricks::new(prepared, params, keep)?;
@@ -167,17 +243,20 @@ impl Discretisation for VoxelModel {
             coarsen: &self.bricks,
             multigrid: self.multigrid(),
             goal: None::<NoGoal>,
-            held: match loads {
-                LoadSet::Ends => supports::held(&nodes, motion, self.params.load),
-                LoadSet::UnitStrains(numbers) => {
+            held: match (loads, &self.by_label) {
+                (LoadSet::Ends, Some(labels)) => labels.hold(nodes.padding()),
+                (LoadSet::Ends, None) => supports::held(&nodes, motion, self.params.load),
+                (LoadSet::UnitStrains(numbers), _) => {
                     supports::held_faces(&nodes, self.params.conditions, numbers[0])
                 }
             },
-            start: Box::new(move |load| match loads {
-                LoadSet::Ends => supports::start(&nodes, motion),
-                LoadSet::UnitStrains(_) => supports::affine(&nodes, mesh.grid.size_mm(), load),
+            start: Box::new(move |load| match (loads, &self.by_label) {
+                (LoadSet::Ends, Some(labels)) => labels.start(),
+                (LoadSet::Ends, None) => supports::start(&nodes, motion),
+                (LoadSet::UnitStrains(_), _) => supports::affine(&nodes, mesh.grid.size_mm(), load),
             }),
             ends: self.ends(),
+            by_label: self.by_label.as_ref().map(|by| LabelSupports { by, mesh }),
             load_steps: self.params.plasticity.as_ref().map(|_| self.load_steps()),
             sites: mesh.elements,
             dropped: mesh.dropped,
@@ -209,8 +288,15 @@ impl Discretisation for VoxelModel {
                 range.map(part).sum()
             })
         };
-        let reaction = sum(&|plane| if plane >= grips.high { 1.0 } else { 0.0 });
-        let virial = loaded.gauge_mm * sum(&|plane| along(grips, plane));
+        let reaction = match self.uneven {
+            None => sum(&|plane| if plane >= grips.high { 1.0 } else { 0.0 }),
+            Some(_) => self.upper_force(force, axis),
+        };
+        // Forces of uneven ends act at many heights: no volume lies between them.
+        let virial = match self.uneven {
+            None => loaded.gauge_mm * sum(&|plane| along(grips, plane)),
+            Some(_) => f64::NAN,
+        };
         let from_energy_mpa = loaded.from_energy(info.energy);
         Moduli {
             e_app_mpa: from_energy_mpa,

@@ -4,6 +4,7 @@ use crate::discretisation::voxels::{Planes, VoxelMesh};
 use crate::operator::held::Held;
 use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::ends::supports::{Node, Nodes};
+use crate::pipeline::apparent::ends::uneven::Uneven;
 
 /// The nodes of a mesh between its grips.
 #[derive(Clone, Copy)]
@@ -12,6 +13,8 @@ pub struct Gripped<'a> {
     pub mesh: &'a VoxelMesh,
     /// Planes that are held.
     pub grips: Planes,
+    /// What is held in place of them.
+    pub uneven: Option<&'a Uneven>,
 }
 
 impl Nodes for Gripped<'_> {
@@ -20,16 +23,28 @@ impl Nodes for Gripped<'_> {
     }
 
     fn each(&self, mut visit: impl FnMut(usize, Node)) {
-        let Gripped { mesh, grips } = *self;
+        let Gripped {
+            mesh,
+            grips,
+            uneven,
+        } = *self;
         let (n, h) = (mesh.grid.n, mesh.grid.spacing_mm);
         self.each_number(|number, at| {
             if mesh.around[number] != 0 {
                 let plane = at[grips.axis.index()];
+                let end = match uneven {
+                    None => End::at(plane, grips.low, grips.high),
+                    Some(uneven) => uneven.end(at),
+                };
                 let node = Node {
                     place_mm: std::array::from_fn(|a| at[a] as f64 * h[a]),
                     on_side: std::array::from_fn(|a| at[a] == 0 || at[a] == n[a]),
-                    end: End::at(plane, grips.low, grips.high),
-                    along: along(grips, plane),
+                    end,
+                    along: match end {
+                        Some(End::Lower) => 0.0,
+                        Some(End::Upper) => 1.0,
+                        None => along(grips, plane),
+                    },
                 };
                 visit(number, node);
             }

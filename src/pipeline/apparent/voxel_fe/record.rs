@@ -10,7 +10,7 @@ use crate::physics::hex8::flips::Solved;
 use crate::pipeline::apparent::discretisation::Prepared;
 use crate::pipeline::apparent::ends::supports::held;
 use crate::pipeline::apparent::fields::{Equilibrated, Field, FieldVolume, Place, Recorded};
-use crate::pipeline::apparent::params::{Sed, SolveParams};
+use crate::pipeline::apparent::params::{Load, Sed, SolveParams};
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::bricks::Bricks;
 use crate::pipeline::apparent::voxel_fe::bricks::rule;
@@ -77,7 +77,7 @@ impl<'a> Recorder<'a> {
         Recorded {
             fields: self.fields(scan),
             failure: failure::chosen(&table, self.params),
-            surface: (self.is_uniform && self.solved.plastic.is_none())
+            surface: (self.is_uniform && self.solved.plastic.is_none() && !self.by_label())
                 .then(|| self.surface())
                 .flatten(),
             note: None,
@@ -99,6 +99,11 @@ impl<'a> Recorder<'a> {
             stiffness: move |node| bricks.stiffness_of(node),
             u: self.solved.u,
         }
+    }
+
+    /// Whether there are no ends whose modulus answers to the surface.
+    fn by_label(&self) -> bool {
+        self.params.load == Load::Labels
     }
 
     fn fraction(&self, element: usize) -> f32 {
@@ -184,6 +189,8 @@ impl<'a> Recorder<'a> {
             free_faces: free_faces(element),
         }))?;
         let of_flips = match self.model.bricks {
+            // New nodes on uneven ends would have to move with them.
+            Bricks::Homogeneous(_) if self.params.ends_depth_mm > 0.0 => None,
             Bricks::Homogeneous(_) => self.flipped(mean_mpa),
             Bricks::Heterogeneous(_) => None,
         };

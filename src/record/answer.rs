@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::io::atomic;
 use crate::result::answer::found_by::FoundBy;
 use crate::result::answer::targets::Targets;
-use crate::result::answer::{AnswerLine, ScanFacts, best, line};
+use crate::result::answer::{AnswerLine, ScanFacts, best, failure_load, line};
 use crate::result::condition::{Condition, shared};
 use crate::result::row::Row;
 use serde::{Deserialize, Serialize};
@@ -51,6 +51,9 @@ pub struct Answer {
     pub max_stress_mpa: Option<f64>,
     #[serde(default)]
     pub max_stress_error_mpa: Option<f64>,
+    /// Stated error of `failure_load_n`.
+    #[serde(default)]
+    pub failure_load_error_n: Option<f64>,
     /// What a reader must know of the number.
     pub note: Option<String>,
     /// Of all rows of the condition together.
@@ -72,7 +75,7 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
             .iter()
             .filter(|row| Condition::of(&row.key) == condition)
     };
-    let failure = own().filter_map(|row| row.failure()?.load_n).next_back();
+    let failure = own().filter_map(|row| failure_load(row)).next_back();
     let AnswerLine {
         scan,
         subject,
@@ -97,6 +100,7 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         yield_stress_error_mpa,
         max_stress_mpa,
         max_stress_error_mpa,
+        failure_load_error_n,
         ..
     } = line(best(own().copied())?, facts);
     let wall_s = own()
@@ -119,7 +123,7 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         threshold_sensitivity,
         stiffness_n_per_mm,
         force_n,
-        failure_load_n: failure_load_n.or(failure),
+        failure_load_n: failure_load_n.or(failure.map(|f| f.0)),
         angle_deg,
         moment_nmm,
         failure_moment_nmm,
@@ -127,6 +131,10 @@ pub fn answer(rows: &[Row], facts: &ScanFacts) -> Option<Answer> {
         yield_stress_error_mpa,
         max_stress_mpa,
         max_stress_error_mpa,
+        failure_load_error_n: match failure_load_n {
+            Some(_) => failure_load_error_n,
+            None => failure.and_then(|f| f.1),
+        },
         note,
         wall_s: Some(wall_s.sum()),
         targets: facts.targets.clone(),

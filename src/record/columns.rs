@@ -85,7 +85,7 @@ pub const FILES: [File; 21] = [
     },
 ];
 
-const ANSWERS: [Column; 28] = [
+const ANSWERS: [Column; 29] = [
     SCAN,
     SUBJECT,
     GROUP,
@@ -142,6 +142,11 @@ const ANSWERS: [Column; 28] = [
     YIELD_ERROR,
     MAX_STRESS,
     MAX_ERROR,
+    column(
+        "failure_load_error_n",
+        "N",
+        "stated error of failure_load_n: in relative terms that of the modulus of the row that found it; NA where that states none",
+    ),
 ];
 
 const RESULTS: [Column; 66] = [

@@ -82,7 +82,7 @@ impl Answers {
 /// What a failure load is, where one was found.
 fn failure_in_words(lines: &[AnswerLine]) -> Option<String> {
     lines.iter().any(|line| line.failure_load_n.is_some()).then(|| {
-        "Failure load: by Pistoia's criterion, the force at which a share of the bone (2 % unless set otherwise) exceeds an effective strain (0.007). It is proportional to the tissue modulus; no error of it is stated."
+        "Failure load: by Pistoia's criterion, the force at which a share of the bone (2 % unless set otherwise) exceeds an effective strain (0.007). It is proportional to the tissue modulus. Its ± is that of E_app in relative terms, which held as often on bodies of known failure load; it does not hold what the criterion leaves open."
             .to_owned()
     })
 }
@@ -191,7 +191,7 @@ fn cells(line: &AnswerLine, answers: &Answers) -> Vec<Cell> {
         number(line.stiffness_n_per_mm),
         number(line.force_n),
         number(line.moment_nmm),
-        number(line.failure_load_n),
+        with_error(line.failure_load_n, line.failure_load_error_n),
         number(line.failure_moment_nmm),
         with_error(line.yield_stress_mpa, line.yield_stress_error_mpa),
         with_error(line.max_stress_mpa, line.max_stress_error_mpa),

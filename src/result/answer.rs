@@ -71,6 +71,15 @@ pub struct AnswerLine {
     pub max_stress_mpa: Option<f64>,
     /// Stated error of `max_stress_mpa`; None where it was not asked for.
     pub max_stress_error_mpa: Option<f64>,
+    /// Stated error of `failure_load_n`; None where the row that found it states none of its modulus.
+    pub failure_load_error_n: Option<f64>,
+}
+
+/// Force at failure by Pistoia's criterion that a row found, and its stated error, N. The error is that of the row's modulus in relative
+/// terms: on bodies of known failure load it holds as often (`reports/whole-bones.md`).
+pub fn failure_load(row: &Row) -> Option<(f64, Option<f64>)> {
+    let load = row.failure()?.load_n?;
+    Some((load, row.error().map(|e| e * load)))
 }
 
 /// What is known of a scan apart from its rows.
@@ -150,6 +159,7 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
     let target = target.filter(|_| !row.is_disconnected());
     let answered = row.answered_error();
     let strength = row.solved.as_ref().map(|s| s.strength).unwrap_or_default();
+    let failure = failure_load(row);
     AnswerLine {
         scan: key.scan.clone(),
         subject: row.marks.subject.clone(),
@@ -169,7 +179,7 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         grip_mm: key.grip_mm,
         stiffness_n_per_mm: forces.map(|[_, k]| k),
         force_n: forces.map(|[f, _]| f),
-        failure_load_n: row.failure().and_then(|f| f.load_n),
+        failure_load_n: failure.map(|f| f.0),
         yield_stress_mpa: strength.yield_stress_mpa,
         threshold_sensitivity: row
             .solved
@@ -183,6 +193,7 @@ pub fn line(row: &Row, facts: &ScanFacts) -> AnswerLine {
         yield_stress_error_mpa: strength.yield_stress_error_mpa,
         max_stress_mpa: strength.max_stress_mpa,
         max_stress_error_mpa: strength.max_stress_error_mpa,
+        failure_load_error_n: failure.and_then(|f| f.1),
     }
 }
 
@@ -219,8 +230,11 @@ pub fn answers(
                 notes::add(&mut answer.note, why);
             }
         }
-        let mut failure = own.iter().filter_map(|r| r.failure()?.load_n);
-        answer.failure_load_n = answer.failure_load_n.or(failure.next_back());
+        if answer.failure_load_n.is_none() {
+            let failure = own.iter().filter_map(|r| failure_load(r)).next_back();
+            answer.failure_load_n = failure.map(|f| f.0);
+            answer.failure_load_error_n = failure.and_then(|f| f.1);
+        }
         Some(answer)
     };
     scans.into_iter().filter_map(answer).collect()

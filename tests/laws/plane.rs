@@ -171,6 +171,7 @@ fn bond_based_row() -> Model {
         given: &given,
         old: &[],
         dt: 1.0,
+        load: &[],
     };
     stiffness_row(
         "remodelling, bonds",

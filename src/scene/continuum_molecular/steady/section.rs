@@ -27,7 +27,7 @@ pub fn sections<const D: usize>(solid: &Solid<D>, setup: &Setup, x: &[[f64; D]])
                 continue;
             }
             let (b, k) = (&setup.bonds[kind], &solid.moduli[kind]);
-            let d = solid.strained(setup, x, p, q, b);
+            let d = solid.strained(x, p, q, b);
             let weight = factor * b.volume_mm2 * setup.cell / width;
             let (axial, lateral) = (weight * k.axial * d.stretch, weight * k.shear * d.shear);
             let [nx, ny] = b.n;

@@ -30,7 +30,7 @@ pub struct Body {
     density: Vec<f64>,
 }
 
-/// Values of a body beside its densities.
+/// Values of a body other than its densities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Motion {
     pub cases: usize,

@@ -51,7 +51,7 @@ impl BondBasedParams {
             Micromodulus::Finite(e) => Err(Error::setting(
                 key("micromodulus.finite"),
                 format!(
-                    "found {e} beside poisson or cases, for which no fit at finite strain is known"
+                    "found {e} together with poisson or cases, for which no fit at finite strain is known"
                 ),
                 "take \"discrete\" or \"continuous\"",
             )),

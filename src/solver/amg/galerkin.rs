@@ -3,12 +3,13 @@
 //! Made part by part of the sites: a sweep over a part makes rows of `P` ahead of itself and drops them behind, and rows
 //! of `AP` one at a time. Six columns are kept in eight lanes.
 
+use super::aggregate::NONE;
 use super::blocks::{self, Block6, BlockMatrix};
 use super::fine::Body;
 use super::image::{Gather, Image, Wide6};
 use super::level::Level;
 use super::rigid::{self, Mat6};
-use super::window::{BLOCK, Prolongator};
+use super::window::{BLOCK, Rows, Wide, Window};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -80,6 +81,77 @@ fn part<const D: usize>(level: &impl Level<D>, omega: f32, sites: Range<usize>) 
     Part {
         places: sum.places,
         blocks: sum.blocks.iter().map(packed).collect(),
+    }
+}
+
+/// Rows of `P = (I − ω D⁻¹A) P₀`.
+struct Prolongator<'l, L, const D: usize> {
+    level: &'l L,
+    omega: f32,
+    /// Rows of `P₀`: at most one block each.
+    modes: Window<D>,
+    rows: Window<D>,
+    image: Image<D>,
+    gather: Gather<D>,
+}
+
+impl<'l, const D: usize, L: Level<D>> Prolongator<'l, L, D> {
+    fn new(level: &'l L, omega: f32) -> Self {
+        Prolongator {
+            level,
+            omega,
+            modes: Window::new(),
+            rows: Window::new(),
+            image: Image::new(level.aggregates().count),
+            gather: Gather::here(),
+        }
+    }
+
+    /// The rows that the last [`Prolongator::cover`] made.
+    fn rows(&self) -> &Window<D> {
+        &self.rows
+    }
+
+    /// Makes the rows of `sites`; earlier ones are dropped.
+    fn cover(&mut self, sites: Range<usize>) {
+        let n = self.level.sites();
+        let span = |b: usize| b * BLOCK..((b + 1) * BLOCK).min(n);
+        let blocks = |r: Range<usize>| r.start / BLOCK..r.end.div_ceil(BLOCK);
+        let wanted = blocks(sites);
+        self.rows.drop_before(&wanted);
+        while let Some(b) = self.rows.missing(&wanted) {
+            self.cover_modes(blocks(self.level.reach(span(b))));
+            let mut rows = Rows::new();
+            let (level, omega, modes, gather) = (self.level, self.omega, &self.modes, self.gather);
+            let image = &mut self.image;
+            level.each_row(span(b), &mut |site, columns, blocks| {
+                let (home, own) = modes.row(site);
+                if let ([home], [own]) = (home, own) {
+                    gather.image(image, columns, blocks, modes, 0);
+                    gather.smooth(image, omega, &level.inverse(site), *home, own);
+                    rows.extend(image.aggregates(), image.blocks());
+                }
+                rows.end_row();
+            });
+            self.rows.push(rows);
+        }
+    }
+
+    fn cover_modes(&mut self, wanted: Range<usize>) {
+        self.modes.drop_before(&wanted);
+        while let Some(b) = self.modes.missing(&wanted) {
+            let sites = b * BLOCK..((b + 1) * BLOCK).min(self.level.sites());
+            let mut rows = Rows::new();
+            let aggregates = self.level.aggregates();
+            self.level.each_modes(sites, |site, modes| {
+                let aggregate = aggregates.of(site);
+                if aggregate != NONE {
+                    rows.extend(&[aggregate], &[Wide(modes)]);
+                }
+                rows.end_row();
+            });
+            self.modes.push(rows);
+        }
     }
 }
 

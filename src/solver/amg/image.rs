@@ -4,15 +4,9 @@
 //! Arithmetic is in functions that are compiled for an instruction set and called once a row: closures that a level
 //! calls are compiled without it.
 
-use super::level::Modes;
-use super::window::Window;
+use super::window::{Wide, Window};
 use crate::simd;
 use crate::simd::{Isa, Lanes};
-
-/// A block of `D × 6` in eight lanes, never across two cache lines.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(32))]
-pub struct Wide<const D: usize>(pub Modes<D>);
 
 /// A block of 6 × 6 in eight lanes.
 #[derive(Debug, Clone, Copy)]

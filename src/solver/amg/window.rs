@@ -1,23 +1,26 @@
-//! Owns the rows of a smoothed prolongator, made where a sweep over the sites needs them and dropped behind it.
+//! Owns rows of consecutive sites that a sweep keeps: blocks of `D × 6` by aggregate.
 
-use super::aggregate::NONE;
-use super::image::{Gather, Image, Wide};
-use super::level::Level;
+use super::level::Modes;
 use std::collections::VecDeque;
 use std::ops::Range;
 
 /// Sites per block of the window.
 pub const BLOCK: usize = 256;
 
+/// A block of `D × 6` in eight lanes, never across two cache lines.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(32))]
+pub struct Wide<const D: usize>(pub Modes<D>);
+
 /// The rows of one block of sites: where each begins, and its aggregates with a block of `D × 6` each.
-struct Rows<const D: usize> {
+pub struct Rows<const D: usize> {
     starts: Vec<u32>,
     aggregates: Vec<u32>,
     blocks: Vec<Wide<D>>,
 }
 
 impl<const D: usize> Rows<D> {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let mut starts = Vec::with_capacity(BLOCK + 1);
         starts.push(0);
         Rows {
@@ -27,7 +30,13 @@ impl<const D: usize> Rows<D> {
         }
     }
 
-    fn end_row(&mut self) {
+    /// Adds to the row in the making.
+    pub fn extend(&mut self, aggregates: &[u32], blocks: &[Wide<D>]) {
+        self.aggregates.extend_from_slice(aggregates);
+        self.blocks.extend_from_slice(blocks);
+    }
+
+    pub fn end_row(&mut self) {
         self.starts.push(self.blocks.len() as u32);
     }
 }
@@ -42,7 +51,7 @@ pub struct Window<const D: usize> {
 }
 
 impl<const D: usize> Window<D> {
-    fn new() -> Self {
+    pub fn new() -> Self {
         Window {
             first: 0,
             blocks: VecDeque::new(),
@@ -57,8 +66,13 @@ impl<const D: usize> Window<D> {
         (&rows.aggregates[range.clone()], &rows.blocks[range])
     }
 
+    /// Appends the rows of the next block.
+    pub fn push(&mut self, rows: Rows<D>) {
+        self.blocks.push_back(rows);
+    }
+
     /// Drops the blocks before `blocks.start`.
-    fn drop_before(&mut self, blocks: &Range<usize>) {
+    pub fn drop_before(&mut self, blocks: &Range<usize>) {
         if blocks.start < self.first || blocks.start > self.first + self.blocks.len() {
             self.blocks.clear();
         }
@@ -72,81 +86,8 @@ impl<const D: usize> Window<D> {
     }
 
     /// The next block to append until there are those up to `blocks.end`.
-    fn missing(&self, blocks: &Range<usize>) -> Option<usize> {
+    pub fn missing(&self, blocks: &Range<usize>) -> Option<usize> {
         let next = self.first + self.blocks.len();
         (next < blocks.end).then_some(next)
-    }
-}
-
-/// Rows of `P = (I − ω D⁻¹A) P₀`.
-pub struct Prolongator<'l, L, const D: usize> {
-    level: &'l L,
-    omega: f32,
-    /// Rows of `P₀`: at most one block each.
-    modes: Window<D>,
-    rows: Window<D>,
-    image: Image<D>,
-    gather: Gather<D>,
-}
-
-impl<'l, const D: usize, L: Level<D>> Prolongator<'l, L, D> {
-    pub fn new(level: &'l L, omega: f32) -> Self {
-        Prolongator {
-            level,
-            omega,
-            modes: Window::new(),
-            rows: Window::new(),
-            image: Image::new(level.aggregates().count),
-            gather: Gather::here(),
-        }
-    }
-
-    /// The rows that the last [`Prolongator::cover`] made.
-    pub fn rows(&self) -> &Window<D> {
-        &self.rows
-    }
-
-    /// Makes the rows of `sites`; earlier ones are dropped.
-    pub fn cover(&mut self, sites: Range<usize>) {
-        let n = self.level.sites();
-        let span = |b: usize| b * BLOCK..((b + 1) * BLOCK).min(n);
-        let blocks = |r: Range<usize>| r.start / BLOCK..r.end.div_ceil(BLOCK);
-        let wanted = blocks(sites);
-        self.rows.drop_before(&wanted);
-        while let Some(b) = self.rows.missing(&wanted) {
-            self.cover_modes(blocks(self.level.reach(span(b))));
-            let mut rows = Rows::new();
-            let (level, omega, modes, gather) = (self.level, self.omega, &self.modes, self.gather);
-            let image = &mut self.image;
-            level.each_row(span(b), &mut |site, columns, blocks| {
-                let (home, own) = modes.row(site);
-                if let ([home], [own]) = (home, own) {
-                    gather.image(image, columns, blocks, modes, 0);
-                    gather.smooth(image, omega, &level.inverse(site), *home, own);
-                    rows.aggregates.extend_from_slice(image.aggregates());
-                    rows.blocks.extend_from_slice(image.blocks());
-                }
-                rows.end_row();
-            });
-            self.rows.blocks.push_back(rows);
-        }
-    }
-
-    fn cover_modes(&mut self, wanted: Range<usize>) {
-        self.modes.drop_before(&wanted);
-        while let Some(b) = self.modes.missing(&wanted) {
-            let sites = b * BLOCK..((b + 1) * BLOCK).min(self.level.sites());
-            let mut rows = Rows::new();
-            let aggregates = self.level.aggregates();
-            self.level.each_modes(sites, |site, modes| {
-                let aggregate = aggregates.of(site);
-                if aggregate != NONE {
-                    rows.aggregates.push(aggregate);
-                    rows.blocks.push(Wide(modes));
-                }
-                rows.end_row();
-            });
-            self.modes.blocks.push_back(rows);
-        }
     }
 }

@@ -9,7 +9,7 @@ pub fn check(thermal: Option<&Thermal>, conduction: Option<&ConductionFile>) -> 
     if thermal.is_some_and(|t| t.rise.is_some() && t.reference.is_some()) {
         return refuse(
             "elasticity.thermal.reference",
-            "a reference temperature beside a rise, which is one above it",
+            "a reference temperature and a rise, which is one above it",
             OUT,
         );
     }

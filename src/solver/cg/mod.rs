@@ -223,9 +223,9 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
             work = now.work;
             let risen = now.energy > anchor.0 + (RISE - 1.0) * anchor.0.abs();
             ended = match checked(ended, energy, now.energy, anchor.0.abs()) {
+                _ if !forced && now.energy.abs() <= MECHANISM_ENERGY * whole => Ended::Mechanism,
                 _ if risen => Ended::Breakdown,
                 Ended::Breakdown => Ended::Breakdown,
-                _ if !forced && now.energy <= MECHANISM_ENERGY * whole => Ended::Mechanism,
                 _ if now.norm == 0.0 => Ended::ResidualTolerance,
                 goes_on => goes_on,
             };
@@ -234,6 +234,10 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
     }
     let end = vectors.residual(u, 1.0);
     ended = checked(ended, expected(anchor, &tail), end.energy, anchor.0.abs());
+    // Where nothing is left but rounding, iterations break down. A good preconditioner gets there in a few.
+    if ended == Ended::Breakdown && !forced && end.energy.abs() <= MECHANISM_ENERGY * whole {
+        ended = Ended::Mechanism;
+    }
     let energy = end.energy + 2.0 * end.work;
     CgInfo {
         ended,

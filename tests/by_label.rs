@@ -162,6 +162,23 @@ fn balanced_forces_need_no_support() {
     assert!(recorded.note.unwrap().contains("no label is held"));
 }
 
+/// Nodes that are guided and pushed: each line has its own part of their forces, and half of all work is the energy.
+#[test]
+fn shared_nodes_count_once() {
+    let (bar, image) = bar(1, 6, 0.1);
+    let params = settings(&image, &["1", "2:xy"], &[], &["2:0,0,2"]);
+    let (solved, recorded) = solve(&bar, &params);
+    let [_, guided, pushed] = &recorded.details.labels[..] else {
+        panic!("{:?}", recorded.details.labels);
+    };
+    assert_near(pushed.force_z_n, 2.0, 1e-12);
+    assert!(guided.force_z_n.abs() < 1e-4, "{guided:?}");
+    // F² L / (E A).
+    let work: f64 = recorded.details.labels.iter().map(|l| l.work_nmm).sum();
+    assert_near(work, 2.0 * 2.0 * 0.6 / (E * 0.01), 1e-6);
+    assert_near(solved.work.force_n.unwrap(), 2.0, 1e-9);
+}
+
 #[test]
 fn wrong_supports_are_refused_in_words() {
     let (bar, image) = bar(2, 5, 0.1);
@@ -188,8 +205,14 @@ fn wrong_supports_are_refused_in_words() {
         ),
         ("nothing loads the bone", of(&["1"], &[], &[])),
         (
-            "displaced along z by two values",
+            "label 2 is both held and moved along z",
             of(&["1", "2:z"], &["2:0,0,0.1"], &[]),
+        ),
+        ("has no label 9", of(&["1"], &["9:0,0,0.1"], &[])),
+        ("moved by 0 mm", of(&["1"], &["2:0,0,0"], &[])),
+        (
+            "label 2 is named twice",
+            of(&["1"], &[], &["2:0,0,1", "2:0,0,1"]),
         ),
     ] {
         assert!(found.contains(said), "{said}: {found}");

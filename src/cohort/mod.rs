@@ -24,6 +24,7 @@ use crate::pipeline::apparent::Field;
 use crate::recipe::Recipe;
 use crate::record::failures;
 use crate::record::failures::Failure;
+use crate::record::in_vivo::remove as remove_daily_loads;
 use crate::record::results;
 use crate::result::row::Row;
 use indicatif::ProgressBar;
@@ -324,6 +325,9 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
     };
     let mut scan = OpenScan::open(dir, &opened_for, session.force, session)?;
     let daily = recipe.in_vivo_mpa.filter(|_| !session.dry_run);
+    if !session.dry_run {
+        remove_daily_loads(dir);
+    }
     if daily.is_some() {
         scan.keep_unit_fields();
     }

@@ -36,6 +36,19 @@ pub struct InVivoLine {
     pub failure_factor: Option<f64>,
 }
 
+/// How the files of the combined field begin.
+pub const COMBINED: &str = "field-sed-in-vivo-mpa";
+
+/// Removes the table and the combined field in `dir`: they are of rows that are solved again.
+pub fn remove(dir: &Path) {
+    let _ = std::fs::remove_file(dir.join(IN_VIVO));
+    for entry in std::fs::read_dir(dir).into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with(COMBINED) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
 /// Writes the table into `dir`.
 ///
 /// # Errors

@@ -34,6 +34,16 @@ pub fn combine(
     session: &Session,
 ) -> Result<()> {
     let units = scan.unit_fields.take().unwrap_or_default();
+    if let Some(unit) = units.iter().find(|u| u.row.converged() != Some(true)) {
+        return Err(Error::setting(
+            "in_vivo_mpa",
+            format!(
+                "the unit load {} did not converge",
+                unit.row.key.load.name()
+            ),
+            "raise max_iterations or tolerance, or leave in_vivo_mpa out of the recipe",
+        ));
+    }
     let load = |unit: &UnitField| unit.row.load_carried_by_ends().filter(|l| *l > 0.0);
     let loads: Option<Vec<f64>> = units.iter().map(load).collect();
     let bone: Vec<usize> = match units.first() {

@@ -3,7 +3,8 @@
 
 use crate::error::{Error, Result};
 use crate::format::orient;
-use crate::image::scan::{self, Reading};
+use crate::grid::Axis;
+use crate::image::scan::{self, Reading, Scan};
 use crate::pipeline::apparent::SolveParams;
 use crate::pipeline::apparent::ends::label_image::{Laid, whole_numbers};
 use crate::pipeline::segment::{labels_like, laid};
@@ -18,6 +19,9 @@ use std::sync::Arc;
 /// An image that cannot be read, of other voxels than the scan's, at another place, or of values that are no labels.
 pub fn lay(dir: &Path, params: &mut SolveParams) -> Result<()> {
     let Some(image) = &mut params.supports else {
+        if params.names_labels() {
+            params.own_labels = Some(specimen::load(dir)?.record.input.blake3);
+        }
         return Ok(());
     };
     let path = image.path.as_path();
@@ -52,20 +56,19 @@ fn laid_on(dir: &Path, path: &Path, record: &SegmentRecord) -> Result<Volume<f32
         let own = orient::turned_copy(volume, &to_specimen).into_owned();
         (own.grid.n == results.voxels).then_some(own)
     };
+    let is_turned = record.settings.turn != Axis::Z || results.rotation.is_some();
     let refused = match on_mask {
         Ok(volume) => match is_whole(&volume) {
+            Some(own) if is_turned && fits_the_scan(path, record) => {
+                return Err(two_ways(path, own.grid.n));
+            }
             Some(own) => return Ok(own),
             None => None,
         },
         Err(refused) => Some(refused),
     };
     let settings = &record.settings;
-    let as_scanned = Reading {
-        spacing_mm: settings.spacing_mm,
-        unit: settings.units,
-        raw: settings.raw,
-    };
-    let whole = match (scan::read_as(&record.input.path, &as_scanned), refused) {
+    let whole = match (as_scanned(record), refused) {
         (Ok(whole), _) => whole,
         (Err(_), Some(refused)) => return Err(refused),
         (Err(unread), None) => return Err(unread),
@@ -83,4 +86,30 @@ fn laid_on(dir: &Path, path: &Path, record: &SegmentRecord) -> Result<Volume<f32
             "segment the scan again, or give the labels on the grid of mask.nii.gz",
         )),
     }
+}
+
+/// The scan as it came.
+fn as_scanned(record: &SegmentRecord) -> Result<Scan> {
+    let settings = &record.settings;
+    let reading = Reading {
+        spacing_mm: settings.spacing_mm,
+        unit: settings.units,
+        raw: settings.raw,
+    };
+    scan::read_as(&record.input.path, &reading)
+}
+
+/// Whether a label image that fits the mask fits the scan, which lies otherwise, as well: then nothing says on which it lies.
+fn fits_the_scan(path: &Path, record: &SegmentRecord) -> bool {
+    as_scanned(record).is_ok_and(|whole| laid::on(&whole, path, &mut Vec::new()).is_ok())
+}
+
+fn two_ways(path: &Path, n: [usize; 3]) -> Error {
+    Error::file(
+        path,
+        format!(
+            "has {n:?} voxels and no place in space: it fits the scan and the mask, which is turned against the scan"
+        ),
+        "give the labels as NIfTI, NRRD or MetaImage with the orientation of mask.nii.gz",
+    )
 }

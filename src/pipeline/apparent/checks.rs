@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::physics::plasticity::Plasticity;
 use crate::pipeline::apparent::fields::Field;
-use crate::pipeline::apparent::params::{CoarsenBy, Ends, Load, Method, SolveParams};
+use crate::pipeline::apparent::params::{CoarsenBy, Ends, Load, Method, MovedLabel, SolveParams};
 use crate::result::settings::Motion;
 
 impl SolveParams {
@@ -306,6 +306,29 @@ fn check_labels(params: &SolveParams) -> Result<()> {
             "no label is moved or pushed: nothing loads the bone",
             "add --moved LABEL:ux,uy,uz (mm) or --pushed LABEL:fx,fy,fz (N)",
         );
+    }
+    let is_still = |m: &MovedLabel| m.by_mm.iter().flatten().all(|v| *v == 0.0);
+    if params.pushed.is_empty() && params.moved.iter().all(is_still) {
+        return wrong(
+            "solve.moved",
+            "labels are moved by 0 mm and none is pushed: nothing loads the bone",
+            "give a displacement other than 0 mm, or add --pushed LABEL:fx,fy,fz (N)",
+        );
+    }
+    let moved = params.moved.iter().map(|m| m.label);
+    let pushed = params.pushed.iter().map(|p| p.label);
+    for (key, labels) in [
+        ("solve.moved", moved.collect::<Vec<i32>>()),
+        ("solve.pushed", pushed.collect()),
+    ] {
+        let twice = (1..labels.len()).find(|i| labels[..*i].contains(&labels[*i]));
+        if let Some(i) = twice {
+            return wrong(
+                key,
+                &format!("label {} is named twice", labels[i]),
+                "name it once, with all its components",
+            );
+        }
     }
     if params.grip_mm > 0.0 || params.ends != Ends::Free {
         return wrong(

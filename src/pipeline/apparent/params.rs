@@ -103,6 +103,9 @@ pub struct SolveParams {
     /// The image of those labels, on the scan's grid. None: the scan's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub supports: Option<LabelImage>,
+    /// blake3 of the scan, where its own labels are those.
+    #[serde(skip)]
+    pub own_labels: Option<String>,
     /// Bending and torsion: by how many degrees the ends turn against each other.
     pub angle_deg: f64,
     /// Uniaxial loads; other loads hold the ends in all components.
@@ -164,6 +167,7 @@ impl Default for SolveParams {
             moved: Vec::new(),
             pushed: Vec::new(),
             supports: None,
+            own_labels: None,
             angle_deg: 1.0,
             ends: Ends::Free,
             conditions: Conditions::Kinematic,
@@ -215,6 +219,13 @@ impl SolveParams {
             let hash = image.laid.as_ref().map_or("", |laid| &laid.blake3);
             format!("labels of {name} (blake3 {})", &hash[..hash.len().min(16)])
         });
+        let own = self.own_labels.as_ref().filter(|_| self.supports.is_none());
+        let own = own.map(|hash| {
+            format!(
+                "labels of the scan (blake3 {})",
+                &hash[..hash.len().min(16)]
+            )
+        });
         let parts = [
             said("held", self.held.iter().map(ToString::to_string).collect()),
             said(
@@ -226,6 +237,7 @@ impl SolveParams {
                 self.pushed.iter().map(ToString::to_string).collect(),
             ),
             image,
+            own,
         ];
         Some(parts.into_iter().flatten().collect::<Vec<_>>().join("; "))
     }

@@ -109,7 +109,12 @@ impl Placed<'_> {
         let most = if whole { 5.2 } else { 1.0 };
         check_count("segment.align", most * volume / edge_mm.powi(3))?;
         let rotated = Rotated::to_z(&old, direction, edge_mm, whole);
-        self.scan = Cow::Owned(rotated.read(&self.scan, between, self.grey.min));
+        // Nothing is known there: no label, or the least grey value.
+        let outside = match between {
+            Between::Nearest => 0.0,
+            _ => self.grey.min,
+        };
+        self.scan = Cow::Owned(rotated.read(&self.scan, between, outside));
         if let Some(mask) = &self.voi_mask {
             let read = rotated.read(&grey_of(mask), Between::Nearest, 0.0);
             self.voi_mask = Some(Cow::Owned(mask_of(&read)));

@@ -54,7 +54,18 @@ impl Role {
 struct Group {
     label: i32,
     role: Role,
+    /// In rising order.
     nodes: Vec<usize>,
+}
+
+impl Group {
+    /// The force that pushes each node; None where nodes are held or moved.
+    fn share(&self) -> Option<[f64; 3]> {
+        match self.role {
+            Role::Pushed(force) => Some(force.map(|f| f / self.nodes.len() as f64)),
+            Role::Held(_) | Role::Moved(_) => None,
+        }
+    }
 }
 
 /// Supports and loads of a mesh.
@@ -193,14 +204,39 @@ impl ByLabel {
 
     /// Forces, moments, mean displacements and work of each label, from displacements `u` (mm) and the nodal forces that they take (N).
     pub fn table(&self, mesh: &VoxelMesh, u: &[[f64; 3]], force: &[[f64; 3]]) -> Vec<LabelForces> {
-        self.groups
+        let own = |i: usize| line(&self.groups[i], mesh, u, &|node| self.force(i, node, force));
+        (0..self.groups.len()).map(own).collect()
+    }
+
+    /// The part of a node's force that group `i` has: its own share of what pushes, or the reaction, which the first of the groups has that hold
+    /// or move the node.
+    fn force(&self, i: usize, node: usize, force: &[[f64; 3]]) -> [f64; 3] {
+        let group = &self.groups[i];
+        if let Some(share) = group.share() {
+            return share;
+        }
+        let has = |g: &&Group| g.nodes.binary_search(&node).is_ok();
+        if self.groups[..i]
             .iter()
-            .map(|group| line(group, mesh, u, force))
-            .collect()
+            .filter(has)
+            .any(|g| g.share().is_none())
+        {
+            return [0.0; 3];
+        }
+        let mut reaction = force[node];
+        for share in self.groups.iter().filter(has).filter_map(Group::share) {
+            (0..3).for_each(|a| reaction[a] -= share[a]);
+        }
+        reaction
     }
 }
 
-fn line(group: &Group, mesh: &VoxelMesh, u: &[[f64; 3]], force: &[[f64; 3]]) -> LabelForces {
+fn line(
+    group: &Group,
+    mesh: &VoxelMesh,
+    u: &[[f64; 3]],
+    force: &dyn Fn(usize) -> [f64; 3],
+) -> LabelForces {
     let count = group.nodes.len() as f64;
     let mean = |of: &dyn Fn(usize) -> [f64; 3]| {
         let mut sum = [0.0; 3];
@@ -213,12 +249,15 @@ fn line(group: &Group, mesh: &VoxelMesh, u: &[[f64; 3]], force: &[[f64; 3]]) -> 
     let about = mean(&|node| mesh.position(node));
     let moment = |node: usize| {
         let at = mesh.position(node);
-        cross(std::array::from_fn(|a| at[a] - about[a]), force[node])
+        cross(std::array::from_fn(|a| at[a] - about[a]), force(node))
     };
-    let [fx, fy, fz] = mean(&|node| force[node]).map(|v| v * count);
+    let [fx, fy, fz] = mean(force).map(|v| v * count);
     let [mx, my, mz] = mean(&moment).map(|v| v * count);
     let [ux, uy, uz] = mean(&|node| u[node]);
-    let work = |node: &usize| (0..3).map(|a| u[*node][a] * force[*node][a]).sum::<f64>();
+    let work = |node: &usize| {
+        let (u, f) = (u[*node], force(*node));
+        (0..3).map(|a| u[a] * f[a]).sum::<f64>()
+    };
     LabelForces {
         label: group.label,
         role: group.role.name().to_owned(),
@@ -265,10 +304,14 @@ fn groups(mesh: &VoxelMesh, map: &LabelMap, params: &SolveParams) -> Result<Vec<
             });
         }
     }
-    for group in groups.iter().filter(|g| g.nodes.is_empty()) {
-        return Err(not_there(group, map));
+    // A label that the image does not have is why others bear nothing.
+    let all = map.all();
+    let mut empty: Vec<&Group> = groups.iter().filter(|g| g.nodes.is_empty()).collect();
+    empty.sort_by_key(|g| all.contains(&g.label));
+    match empty.first() {
+        Some(group) => Err(not_there(group, map)),
+        None => Ok(groups),
     }
-    Ok(groups)
 }
 
 fn not_there(group: &Group, map: &LabelMap) -> Error {
@@ -305,6 +348,14 @@ fn prescribe(groups: &[Group], held: &mut Held, start: &mut [[f64; 3]]) -> Resul
                         && g.nodes.iter().any(|n| group.nodes.binary_search(n).is_ok())
                 };
                 let other = groups[..i].iter().find(touches);
+                if other.is_some_and(|g| g.label == group.label) {
+                    let axis = ["x", "y", "z"][c];
+                    return Err(Error::setting(
+                        format!("solve.{}", group.role.name()),
+                        format!("label {} is both held and moved along {axis}", group.label),
+                        "name the components that are held, as in --held 2:xy, or leave one of them out",
+                    ));
+                }
                 return Err(Error::setting(
                     format!("solve.{}", group.role.name()),
                     format!(

@@ -125,10 +125,10 @@ impl Pieces {
         let (mut grams, mut products) = (vec![Gram::ZERO; count], vec![[0.0; 6]; count]);
         each(mesh, |node, at| {
             let piece = self.at(node);
-            for c in 0..3 {
+            for (c, moved) in u[node].iter().enumerate() {
                 let row = self.frames[piece].row(at, c);
                 grams[piece].add(&row);
-                (0..6).for_each(|m| products[piece][m] += row[m] * u[node][c]);
+                (0..6).for_each(|m| products[piece][m] += row[m] * moved);
             }
         });
         let motions: Vec<Motion> = grams
@@ -138,8 +138,8 @@ impl Pieces {
             .collect();
         each(mesh, |node, at| {
             let piece = self.at(node);
-            for c in 0..3 {
-                u[node][c] -= dot(&motions[piece], &self.frames[piece].row(at, c));
+            for (c, moved) in u[node].iter_mut().enumerate() {
+                *moved -= dot(&motions[piece], &self.frames[piece].row(at, c));
             }
         });
     }

@@ -45,7 +45,8 @@ impl Uneven {
         let (nb, nc) = (grid.n[b], grid.n[c]);
         let mut faces = [vec![NONE; nb * nc], vec![NONE; nb * nc]];
         let mut first = [f64::INFINITY; 2];
-        for column in 0..nb * nc {
+        let columns = 0..nb * nc;
+        columns.for_each(|column| {
             let is_bone = |k: usize| {
                 let mut at = [0; 3];
                 (at[a], at[b], at[c]) = (k, column % nb, column / nb);
@@ -64,7 +65,7 @@ impl Uneven {
                     faces[end][column] = plane as u32;
                 }
             }
-        }
+        });
         for (end, faces) in [End::Lower, End::Upper].into_iter().zip(&faces) {
             if faces.iter().all(|f| *f == NONE) {
                 let (name, mm) = (end.name(), first[end as usize]);

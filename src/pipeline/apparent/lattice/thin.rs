@@ -45,7 +45,7 @@ impl Precondition for ThinOrPlump<'_> {
             .then(|| NetworkFactor::new(&self.springs, held))
             .flatten();
         match factor {
-            Some(factor) => Chosen::Factor(factor),
+            Some(factor) => Chosen::Factor(Box::new(factor)),
             None => Chosen::Multigrid(Box::new(Amg::new(&self.springs, held, params))),
         }
     }
@@ -53,7 +53,7 @@ impl Precondition for ThinOrPlump<'_> {
 
 enum Chosen<'a> {
     Multigrid(Box<Amg<'a, Springs<'a>>>),
-    Factor(NetworkFactor),
+    Factor(Box<NetworkFactor>),
 }
 
 impl SinglePreconditioner<3> for Chosen<'_> {

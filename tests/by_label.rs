@@ -196,7 +196,7 @@ fn wrong_supports_are_refused_in_words() {
             "a shift along x; a shift along y",
             of(&["1:z"], &[], &["2:0,0,1"]),
         ),
-        ("a shift along z", of(&["1:xy"], &["2:0,0,-"], &[])),
+        ("a shift along z", of(&["1:xy"], &["2:0.1,0,-"], &[])),
         ("do not balance", of(&[], &[], &["2:0,0,1"])),
         ("do not balance", of(&[], &[], &["1:-1,0,0", "2:1,0,0"])),
         (

@@ -187,6 +187,7 @@ fn known() -> Value {
     for key in [
         "plasticity",
         "element_mm",
+        "surface",
         "ends_depth_mm",
         "held",
         "moved",

@@ -97,6 +97,8 @@ pub struct Threshold {
     pub keep_all: bool,
     /// σ in voxels of all blur between the body and `grey` that is known: the scanner's and the smoothing.
     pub blur_voxels: Option<f64>,
+    /// Whether the scanner's part of that was given, and not measured at edges of bone.
+    pub is_blur_given: bool,
 }
 
 impl Specimen {

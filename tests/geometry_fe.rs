@@ -9,7 +9,10 @@ use bonepd_ct::discretisation::tetrahedra::surface::{Bound, Surface};
 use bonepd_ct::grid::Grid;
 use bonepd_ct::measure::pistoia::Pistoia;
 use bonepd_ct::pipeline::apparent::fields::Field;
-use bonepd_ct::pipeline::apparent::{Ends, Load, Method, SolveParams, of_geometry, of_voxels};
+use bonepd_ct::mask::gaussian;
+use bonepd_ct::pipeline::apparent::{
+    Ends, Load, Method, SolveParams, SurfaceOf, of_geometry, of_voxels, settled,
+};
 use bonepd_ct::volume::{Specimen, Threshold, Volume};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -186,6 +189,7 @@ fn specimen(grey: Volume<f32>) -> Specimen {
             keep_all: false,
             // Values of distances need no sharpening.
             blur_voxels: Some(1.0),
+            is_blur_given: false,
         }),
         grey: Some(grey),
     }
@@ -462,4 +466,72 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let (one, three) = (of(1), of(3));
     assert_eq!(one.0.to_bits(), three.0.to_bits());
     assert_eq!(one.1.to_bits(), three.1.to_bits());
+}
+
+/// The half level of `f` blurred by 0.9 voxels, as `segment` hands it on. `f` is bone where it is positive, in voxels of 1 mm.
+fn blurred(n: [usize; 3], f: impl Fn([f64; 3]) -> f64) -> Specimen {
+    const SIGMA: f64 = 0.9;
+    const FINE: usize = 3;
+    let part = |i: usize| (i as f64 + 0.5) / FINE as f64 - 0.5;
+    let share = |p: [f64; 3]| {
+        let inside = (0..FINE.pow(3)).filter(|i| {
+            let [x, y, z] = [i % FINE, i / FINE % FINE, i / (FINE * FINE)].map(part);
+            f([p[0] + x, p[1] + y, p[2] + z]) > 0.0
+        });
+        inside.count() as f64 / FINE.pow(3) as f64 - 0.5
+    };
+    let mut body = specimen(gaussian::smoothed(&grey(n, share), SIGMA));
+    let threshold = body.threshold.as_mut().unwrap();
+    threshold.blur_voxels = Some(SIGMA);
+    threshold.is_blur_given = true;
+    body
+}
+
+/// A bar's modulus goes with its cross-section, which blur makes smaller where it is convex: by the variance (that of the voxel is part
+/// of it) over the radius, on each side. A plane stays where it is.
+#[test]
+fn a_surface_corrected_for_blur_has_the_stiffness_of_the_body() {
+    const RADIUS: f64 = 3.3;
+    let bar = blurred([14, 14, 10], |p| {
+        RADIUS - (p[0] - 7.1).hypot(p[1] - 6.8)
+    });
+    let exact = 1000.0 * PI * RADIUS * RADIUS / 196.0;
+    let of = |body: &Specimen, surface| {
+        let asked = SolveParams {
+            surface,
+            poisson: 0.0,
+            ..params(1.1)
+        };
+        solved(body, &asked).0
+    };
+    let image = of(&bar, Some(SurfaceOf::Image)) / exact - 1.0;
+    let body = of(&bar, None) / exact - 1.0;
+    // By the variance over the square of the radius: 8.2 %.
+    assert!((-0.1..-0.06).contains(&image), "{image}");
+    assert!(body.abs() < 0.01, "{body}");
+    let plate = blurred([12, 8, 8], |p| 2.2 - (p[0] - 5.9).abs());
+    let [image, body] = [SurfaceOf::Image, SurfaceOf::Body].map(|s| of(&plate, Some(s)));
+    let exact = 1000.0 * 4.4 / 12.0;
+    assert!((image / exact - 1.0).abs() < 0.01 && (body / exact - 1.0).abs() < 0.01, "{image} {body}");
+}
+
+/// Two bars beside each other, a gap of 0.9 voxels between them: cells of the default size bridge it here and there. The size that is
+/// chosen does not, and one that is given stays.
+#[test]
+fn elements_are_smaller_where_the_default_size_bridges_a_gap() {
+    let pair = specimen(grey([17, 10, 12], |p| {
+        let gap = (p[0] - 8.5).abs() - 0.55;
+        gap.min(7.0 - (p[0] - 8.5).abs()).min(4.0 - (p[1] - 5.0).abs())
+    }));
+    let open = SolveParams {
+        element_mm: None,
+        ..params(1.0)
+    };
+    let chosen = settled(&pair, &open).unwrap().element_mm.unwrap();
+    assert!(chosen < 2.0, "{chosen}");
+    let solution = of_geometry().solve_specimen(&pair, &open, &mut |_, _| ());
+    let (_, recorded) = solution.unwrap().modulus().unwrap();
+    assert_eq!(recorded.euler, Some([2, 2]));
+    let given = settled(&pair, &params(2.2)).unwrap().element_mm;
+    assert_eq!(given, Some(2.2));
 }

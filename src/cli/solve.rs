@@ -14,7 +14,7 @@ use bonepd_ct::physics::plasticity::Plasticity;
 use bonepd_ct::pipeline::apparent::checks::needs_modulus;
 use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::{
-    CoarsenBy, Conditions, Ends, HeldLabel, Load, LoadSteps, Method, MovedLabel, PushedLabel, Sed,
+    CoarsenBy, Conditions, Ends, HeldLabel, Load, LoadSteps, Method, MovedLabel, PushedLabel, Sed, SurfaceOf,
     SolveParams,
 };
 use bonepd_ct::result::answer::AnswerLine;
@@ -128,6 +128,10 @@ pub struct SolveSettings {
     /// geometry-fe: edge of the cells that elements are made in [default: from the thickness of the struts]
     #[arg(long, value_name = "MM", value_parser = words::positive)]
     element_mm: Option<f64>,
+    /// geometry-fe: the surface of the image, or that of the body: the image's corrected for its blur, which thins struts and fills
+    /// joints [default: body where segment was given --blur-voxels, else image]
+    #[arg(long, value_name = "OF", value_parser = words::choice::<SurfaceOf>(&["image", "body"]))]
+    surface: Option<SurfaceOf>,
     /// What becomes of N³ voxels: threshold (bone where at least half of them is), or fraction (the modulus times the bone
     /// fraction; less than 2 % bone is left out) [default: threshold]
     #[arg(long, value_name = "RULE", value_parser = words::choice::<CoarsenBy>(&["threshold", "fraction"]), requires = "coarsen")]

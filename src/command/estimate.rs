@@ -8,7 +8,7 @@ use crate::pipeline::apparent::discretisation::memory::Memory;
 use crate::pipeline::apparent::discretisation::{Cost, Known, Prepared, Resolution};
 use crate::pipeline::apparent::job::{Job, bone_connects};
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::apparent::{SolveParams, jobs};
+use crate::pipeline::apparent::{SolveParams, jobs, settled};
 use crate::recipe::Recipe;
 use crate::volume::Specimen;
 use serde::Serialize;
@@ -151,6 +151,7 @@ pub fn of_specimen(specimen: &Specimen, first: &Estimate, recipe: &Recipe) -> Re
     let (mut no_bone, mut time_s) = (true, Some(reading * S_PER_VOXEL));
     let loads = recipe.solves().len() as f64;
     for params in &steps {
+        let params = &*settled(specimen, params)?;
         for job in jobs(&recipe.lattice, params) {
             let cost = needed(&job, prepared, params)?;
             bytes = bytes.max(kept + cost.bytes[0]);

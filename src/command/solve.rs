@@ -24,7 +24,7 @@ use crate::pipeline::apparent::discretisation::yielded::Kept;
 use crate::pipeline::apparent::fields::Recorded;
 use crate::pipeline::apparent::job::{Job, JobResult};
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::apparent::{Load, SolveParams, jobs};
+use crate::pipeline::apparent::{Load, SolveParams, jobs, settled};
 use crate::pipeline::lattice::LatticeParams;
 use crate::record::details;
 use crate::record::results::{self, Results};
@@ -228,6 +228,7 @@ impl OpenScan {
     ) -> Result<Vec<Row>> {
         lattices.check()?;
         params.check()?;
+        let params = &*settled(&self.specimen, params)?;
         let jobs: Vec<(Job, Row)> = jobs(lattices, params)
             .into_iter()
             .map(|job| {

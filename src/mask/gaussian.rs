@@ -77,6 +77,12 @@ pub fn map_slabs<R: Send>(
         .collect()
 }
 
+/// All of the volume smoothed.
+pub fn smoothed(volume: &Volume<f32>, sigma: f64) -> Volume<f32> {
+    let slabs = map_slabs(volume, sigma, |v| v, |_, part| part.to_vec());
+    Volume::from_vec(volume.grid, slabs.concat())
+}
+
 fn smooth_slab(
     values: &[f32],
     [nx, ny, nz]: [usize; 3],

@@ -183,6 +183,7 @@ impl SegmentedScan {
             inside,
             keep_all: self.record.settings.keep_all,
             blur_voxels: results.blur_voxels,
+            is_blur_given: self.record.settings.blur_voxels.is_some(),
         });
         Ok(())
     }

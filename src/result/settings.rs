@@ -223,6 +223,8 @@ pub enum Elements {
     BoneFractions,
     /// Inside the surface where interpolated grey values cross the threshold.
     SmoothGrey,
+    /// Inside that surface, corrected for the blur of the image.
+    SmoothDeblurred,
     /// Inside the surface of a smoothed mask.
     SmoothMask,
 }

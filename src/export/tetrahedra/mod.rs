@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::apparent::discretisation::{Discretisation, Prepared};
 use crate::pipeline::apparent::geometry_fe::GeometryModel;
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::apparent::{Load, SolveParams};
+use crate::pipeline::apparent::{Load, SolveParams, settled};
 use crate::volume::Specimen;
 use std::path::Path;
 
@@ -52,6 +52,7 @@ pub fn write(
             "use --load uniaxial or confined",
         ));
     }
+    let params = &*settled(specimen, params)?;
     let tissue = &Tissue::of(specimen, params)?;
     let model = GeometryModel::build(&(), Prepared { specimen, tissue }, params)?;
     if model.elements().mesh.elements.is_empty() {

@@ -82,15 +82,7 @@ impl SolveParams {
             pistoia.check()?;
         }
         check_recorded(self)?;
-        if let Some(size) = self.element_mm
-            && !(size > 0.0 && size.is_finite())
-        {
-            return Err(Error::setting(
-                "solve.element_mm",
-                format!("not usable: {size}"),
-                "give a size in mm above 0, or leave it out: it then follows from the struts",
-            ));
-        }
+        check_smooth(self)?;
         check_plasticity(self)?;
         if self.max_iterations == 0 {
             return Err(Error::setting(
@@ -397,4 +389,29 @@ pub fn needs_modulus(load: Load, key: &str) -> Result<()> {
         ),
         "leave --error out (the row states the solver's error), or use --load uniaxial",
     ))
+}
+
+/// Settings of smooth elements: usable, and not given to another method, where they would have no effect.
+fn check_smooth(params: &SolveParams) -> Result<()> {
+    if let Some(size) = params.element_mm
+        && !(size > 0.0 && size.is_finite())
+    {
+        return Err(Error::setting(
+            "solve.element_mm",
+            format!("not usable: {size}"),
+            "give a size in mm above 0, or leave it out: it then follows from the struts",
+        ));
+    }
+    let given = [
+        ("element_mm", params.element_mm.is_some()),
+        ("surface", params.surface.is_some()),
+    ];
+    match given.into_iter().find(|(_, is_given)| *is_given) {
+        Some((key, _)) if params.method != Method::GeometryFe => Err(Error::setting(
+            format!("solve.{key}"),
+            "only geometry-fe has it",
+            "use method geometry-fe, or leave it out",
+        )),
+        _ => Ok(()),
+    }
 }

@@ -12,6 +12,7 @@ use crate::pipeline::apparent::ends::reactions::reactions;
 use crate::pipeline::apparent::equilibrium::{Observe, equilibrium};
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
 use crate::pipeline::apparent::mechanisms::mechanisms;
+use crate::pipeline::apparent::geometry_fe::topology::settled;
 use crate::pipeline::apparent::params::{Load, SolveParams};
 use crate::pipeline::apparent::solved::{Moduli, Solved};
 use crate::pipeline::apparent::stiffness::{Stiffness, stiffness};
@@ -96,6 +97,7 @@ impl Job {
         observe: &mut Observe,
     ) -> Result<JobResult> {
         params.check()?;
+        let params = &*settled(specimen, params)?;
         let tissue = &Tissue::of(specimen, params)?;
         let prepared = Prepared { specimen, tissue };
         self.solve(prepared, params, &Unlimited, &mut NotKept, observe)

@@ -48,10 +48,12 @@ pub use crate::solver::cg::{CgStep, Ended};
 use crate::volume::Specimen;
 #[doc(hidden)]
 pub use discretisation::Discretisation;
+#[doc(hidden)]
+pub use geometry_fe::topology::settled;
 pub use fields::Field;
 pub use params::{
     CoarsenBy, Conditions, Ends, HeldLabel, Load, LoadSteps, Method, MovedLabel, PushedLabel, Sed,
-    SolveParams,
+    SolveParams, SurfaceOf,
 };
 
 /// The solves that the settings name, in the order of their rows.

@@ -25,6 +25,16 @@ pub enum CoarsenBy {
     Fraction,
 }
 
+/// Whose surface smooth elements have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SurfaceOf {
+    /// Where the image crosses its threshold.
+    Image,
+    /// The same, corrected for what the image's blur does to it: it thins struts and fills joints.
+    Body,
+}
+
 /// A label image of the settings: its file, and its labels once they were read.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(from = "PathBuf", into = "PathBuf")]
@@ -132,6 +142,9 @@ pub struct SolveParams {
     /// geometry-fe: edge of the cells that elements are made in, in mm. None: from the struts' thickness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub element_mm: Option<f64>,
+    /// geometry-fe: whose surface it is. None: the body's where `segment` was given the scanner's blur, else the image's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceOf>,
     /// Also count mechanisms; takes a factorisation.
     pub mechanisms: bool,
     /// Fields to write.
@@ -180,6 +193,7 @@ impl Default for SolveParams {
             coarsen: 1,
             coarsen_by: CoarsenBy::default(),
             element_mm: None,
+            surface: None,
             mechanisms: false,
             fields: Vec::new(),
             pistoia: None,

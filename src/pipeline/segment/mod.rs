@@ -244,6 +244,7 @@ fn threshold_of(
         inside: inside.mask(grid),
         keep_all: params.keep_all,
         blur_voxels: None,
+        is_blur_given: params.blur_voxels.is_some(),
     })
 }
 

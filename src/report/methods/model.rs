@@ -150,7 +150,7 @@ fn bricks(elements: Option<Elements>) -> &'static str {
         Some(Elements::BoneFractions) => {
             "Each block of voxels became one eight-node hexahedral element, with the modulus of the tissue times its bone fraction."
         }
-        Some(Elements::SmoothGrey | Elements::SmoothMask) => {
+        Some(Elements::SmoothGrey | Elements::SmoothDeblurred | Elements::SmoothMask) => {
             "Bone became eight-node hexahedral elements."
         }
     }
@@ -160,6 +160,9 @@ fn tetrahedra(elements: Option<Elements>) -> &'static str {
     match elements {
         Some(Elements::SmoothMask) => {
             "The surface of bone was that of the smoothed mask; the inside was filled with ten-node tetrahedral elements."
+        }
+        Some(Elements::SmoothDeblurred) => {
+            "The surface of bone was where the interpolated grey values, corrected for the blur of the image, cross the threshold; the inside was filled with ten-node tetrahedral elements."
         }
         _ => {
             "The surface of bone was where the interpolated grey values cross the threshold; the inside was filled with ten-node tetrahedral elements."

@@ -1,9 +1,11 @@
 //! Owns the mesh of a specimen: its making, what is said of it against the mask, and the tissue of its elements.
 
 use super::nodes::Grips;
+use super::surface::Source;
 use super::{size, surface};
 use crate::discretisation::tetrahedra::fill::fill;
 use crate::discretisation::tetrahedra::lattice::Lattice;
+use crate::discretisation::tetrahedra::mesh::Mesh;
 use crate::discretisation::tetrahedra::nodes::TetMesh;
 use crate::discretisation::tetrahedra::pieces::{self, Keep, Loaded};
 use crate::discretisation::tetrahedra::quality::{self, Quality};
@@ -21,8 +23,41 @@ pub struct Report {
     pub elements: usize,
     pub quality: Quality,
     pub volume_mm3: f64,
-    /// Euler's number of the mesh and of the mask, both of all bone.
+    /// Euler's number of the mesh and of the mask: of all bone where the mask holds more than its largest piece.
     pub euler: [i64; 2],
+}
+
+/// Whether the mask may hold more than one piece of bone. Grey values have specks that `segment` took out of it.
+pub fn has_other_pieces(specimen: &Specimen) -> bool {
+    let threshold = specimen.threshold.as_ref();
+    threshold.is_none_or(|threshold| threshold.keep_all)
+}
+
+/// All elements of a specimen, in cells of `size_mm`.
+///
+/// # Errors
+/// Too many vertices.
+pub fn filled(
+    specimen: &Specimen,
+    surface: &Surface,
+    grips: &Grips,
+    size_mm: f64,
+) -> Result<Mesh> {
+    let planes = surface::planes_mm(&specimen.bone.grid, size_mm, grips.axis, grips.low_mm);
+    let lattice = Lattice::new(planes).ending_at(grips.axis, &[grips.low_mm, grips.high_mm]);
+    fill(surface, &lattice)
+}
+
+/// Keeps the pieces that carry load.
+pub fn keep_loaded(mesh: &mut Mesh, grips: &Grips, params: &SolveParams) -> Loaded {
+    let keep = match params.load.motion() {
+        None => Keep::AtFaces,
+        Some(_) => Keep::Between {
+            axis: grips.axis,
+            ends_mm: [grips.low_mm, grips.high_mm],
+        },
+    };
+    pieces::keep(mesh, keep)
 }
 
 /// The part of a specimen's smooth elements that carries load.
@@ -35,11 +70,7 @@ pub fn of(
     grips: &Grips,
     params: &SolveParams,
 ) -> Result<(TetMesh, Report)> {
-    let size_mm = size::of(specimen, params);
-    let planes = surface::planes_mm(&specimen.bone.grid, size_mm, grips.axis, grips.low_mm);
-    let ends_mm = [grips.low_mm, grips.high_mm];
-    let lattice = Lattice::new(planes).ending_at(grips.axis, &ends_mm);
-    let mut all = fill(surface, &lattice)?;
+    let mut all = filled(specimen, surface, grips, size::of(specimen, params))?;
     let quality = quality::quality(&all);
     if quality.least_degrees <= 0.0 {
         return Err(Error::specimen(
@@ -47,15 +78,10 @@ pub fn of(
             "take another --element-mm",
         ));
     }
-    let euler = [quality::euler(&all), morphometry::euler(&specimen.bone)];
-    let keep = match params.load.motion() {
-        None => Keep::AtFaces,
-        Some(_) => Keep::Between {
-            axis: grips.axis,
-            ends_mm,
-        },
-    };
-    let loaded = pieces::keep(&mut all, keep);
+    let of_all = has_other_pieces(specimen).then(|| quality::euler(&all));
+    let loaded = keep_loaded(&mut all, grips, params);
+    let of_mesh = of_all.unwrap_or_else(|| quality::euler(&all));
+    let euler = [of_mesh, morphometry::euler(&specimen.bone)];
     let report = Report {
         loaded,
         elements: all.elements.len(),
@@ -68,12 +94,9 @@ pub fn of(
 
 impl Report {
     /// What is said of the mesh in its row.
-    pub fn words(&self, is_of_grey: bool) -> String {
+    pub fn words(&self, source: Source) -> String {
         let q = &self.quality;
-        let from = match is_of_grey {
-            true => "surface of cubic interpolation of grey values",
-            false => "surface of a smoothed mask of the same volume, a guess",
-        };
+        let from = source.words();
         let share = 100.0 * q.outside as f64 / self.elements.max(1) as f64;
         let mut words = format!(
             "{from}: {:.4} mm³ of bone carry load, dihedral angles {:.1} to {:.1} degrees, {share:.2} % of the elements beyond {} and {}",

@@ -7,6 +7,7 @@ mod record;
 mod sensitivity;
 mod size;
 mod surface;
+pub mod topology;
 
 use crate::discretisation::tetrahedra::surface::Surface;
 use crate::error::{Error, Result};
@@ -22,24 +23,25 @@ use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::ends::supports;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
-use crate::pipeline::apparent::params::SolveParams;
+use crate::pipeline::apparent::params::{SolveParams, SurfaceOf};
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::failure;
 use crate::result::details::Details;
-use crate::result::settings::{CellType, Elements, Method, Settings};
+use crate::result::settings::{CellType, Method, Settings};
 use crate::solver::amg::AmgParams;
 use crate::solver::cg::NoGoal;
 use crate::volume::Specimen;
 use mesh::Report;
 use nodes::Grips;
 use record::Recorder;
+use surface::Source;
 
 /// Smooth elements between grips, or joined to the faces where unit strains are the load.
 pub struct GeometryModel {
     model: Tet10,
     surface: Surface,
-    is_of_grey: bool,
+    source: Source,
     grips: Grips,
     motion: EndMotion,
     report: Report,
@@ -100,16 +102,12 @@ impl Discretisation for GeometryModel {
     type Case = ();
 
     fn label(_: &(), specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings {
-        let elements = match surface::is_of_grey(specimen) {
-            true => Elements::SmoothGrey,
-            false => Elements::SmoothMask,
-        };
         Settings {
             method: Method::GeometryFe,
             structure: CellType::Tet10,
             boundary: None,
             lp_mm: size::of(specimen, params),
-            elements: Some(elements),
+            elements: Some(Source::of(specimen, params).elements()),
             registration_mm: None,
             ..key
         }
@@ -123,24 +121,16 @@ impl Discretisation for GeometryModel {
         let Prepared { specimen, tissue } = prepared;
         refuse_settings(tissue, params)?;
         size::check(specimen, params)?;
-        let grip_mm = match params.load.motion() {
-            None => 0.0,
-            Some(_) => params.grip_mm,
-        };
-        let (axis, length) = (params.axis.index(), specimen.length_mm(params.axis));
-        let grips = Grips {
-            axis,
-            low_mm: grip_mm,
-            high_mm: length - grip_mm,
-        };
-        if grips.high_mm <= grips.low_mm {
+        let grips = Grips::of(specimen, params)?;
+        let source = Source::of(specimen, params);
+        if source == Source::Mask && params.surface == Some(SurfaceOf::Body) {
             return Err(Error::setting(
-                "solve.grip_mm",
-                format!("two grips of {grip_mm} mm meet in a specimen {length} mm long"),
-                "give a grip of less than half the length",
+                "solve.surface",
+                "a mask has no grey values to correct for blur",
+                "segment the grey scan, or leave the setting out",
             ));
         }
-        let surface = surface::of(specimen);
+        let surface = surface::of(specimen, source);
         let (mesh, report) = mesh::of(specimen, &surface, &grips, params)?;
         let (young_mpa, poisson, factor) = match tissue {
             Tissue::Uniform(solid) => (solid.young_mpa, solid.poisson, None),
@@ -152,7 +142,7 @@ impl Discretisation for GeometryModel {
         let gauge_mm = grips.high_mm - grips.low_mm;
         Ok(GeometryModel {
             model: Tet10::new(mesh, young_mpa, poisson, factor),
-            is_of_grey: surface::is_of_grey(specimen),
+            source,
             surface,
             grips,
             motion: EndMotion::of(specimen, params, gauge_mm),
@@ -227,8 +217,8 @@ impl Discretisation for GeometryModel {
         let recorder = Recorder::new(self, params, solved, work);
         let table = recorder.failures();
         Ok(Recorded {
-            surface: sensitivity::of(model, surface, self.is_of_grey, solved.u),
-            note: Some(self.report.words(self.is_of_grey)),
+            surface: sensitivity::of(model, surface, self.source != Source::Mask, solved.u),
+            note: Some(self.report.words(self.source)),
             euler: Some(self.report.euler),
             mesh: recorder.fields(),
             failure: failure::chosen(&table, params),

@@ -1,8 +1,11 @@
 //! Owns the nodes of smooth elements as supports see them.
 
 use super::GeometryModel;
+use crate::error::{Error, Result};
 use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::ends::supports::{Node, Nodes};
+use crate::pipeline::apparent::params::SolveParams;
+use crate::volume::Specimen;
 
 /// Where the grips end along the load axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +16,28 @@ pub struct Grips {
 }
 
 impl Grips {
+    /// # Errors
+    /// Grips that meet.
+    pub fn of(specimen: &Specimen, params: &SolveParams) -> Result<Grips> {
+        let grip_mm = match params.load.motion() {
+            None => 0.0,
+            Some(_) => params.grip_mm,
+        };
+        let length = specimen.length_mm(params.axis);
+        if length <= 2.0 * grip_mm {
+            return Err(Error::setting(
+                "solve.grip_mm",
+                format!("two grips of {grip_mm} mm meet in a specimen {length} mm long"),
+                "give a grip of less than half the length",
+            ));
+        }
+        Ok(Grips {
+            axis: params.axis.index(),
+            low_mm: grip_mm,
+            high_mm: length - grip_mm,
+        })
+    }
+
     /// How far a place lies from the lower grip to the upper: 0 to 1.
     pub fn along(&self, at: [f64; 3]) -> f64 {
         ((at[self.axis] - self.low_mm) / (self.high_mm - self.low_mm)).clamp(0.0, 1.0)

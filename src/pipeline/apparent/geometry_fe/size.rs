@@ -18,13 +18,17 @@ pub fn of(specimen: &Specimen, params: &SolveParams) -> f64 {
     params.element_mm.unwrap_or_else(|| {
         let voxel_mm = specimen.bone.grid.voxel_mm3().cbrt();
         let thickness = plate_thickness_mm(&specimen.bone).unwrap_or(f64::INFINITY);
-        let size =
-            (OF_THICKNESS * thickness).clamp(LEAST_VOXELS * voxel_mm, MOST_VOXELS * voxel_mm);
-        let digit = 10f64.powi(size.log10().floor() as i32 - 1);
-        // Through text, so that 0.034 is that and not a neighbour of it.
-        let rounded = (size / digit).round() * digit;
-        format!("{rounded:.6}").parse().unwrap_or(rounded)
+        let size = OF_THICKNESS * thickness;
+        rounded(size.clamp(LEAST_VOXELS * voxel_mm, MOST_VOXELS * voxel_mm))
     })
+}
+
+/// To two digits.
+pub fn rounded(size: f64) -> f64 {
+    let digit = 10f64.powi(size.log10().floor() as i32 - 1);
+    // Through text, so that 0.034 is that and not a neighbour of it.
+    let rounded = (size / digit).round() * digit;
+    format!("{rounded:.6}").parse().unwrap_or(rounded)
 }
 
 /// # Errors

@@ -3,23 +3,76 @@
 use crate::discretisation::tetrahedra::surface::{Bound, Surface};
 use crate::grid::Grid;
 use crate::mask::{gaussian, upsample};
-use crate::pipeline::apparent::resolution::image;
-use crate::result::shape::{BLURRED_VOXELS, Image};
+use crate::pipeline::apparent::params::{SolveParams, SurfaceOf};
+use crate::result::settings::Elements;
+use crate::result::shape::BLURRED_VOXELS;
 use crate::volume::{Specimen, Volume};
 
 /// σ in voxels of the smoothing that makes a surface of a mask: wide enough for planes at any angle, narrow enough for struts of
 /// three voxels.
 const SMOOTHED_MASK: f64 = 0.8;
 
+/// What the surface is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Source {
+    Grey,
+    /// Grey values whose only blur is the voxel's own box, corrected for that.
+    Sharpened,
+    /// Grey values corrected for their blur.
+    Deblurred {
+        /// σ of the blur.
+        sigma_voxels: f64,
+    },
+    Mask,
+}
+
+impl Source {
+    /// Of a specimen: the body's surface where it is asked for, or where the scanner's blur was given.
+    pub fn of(specimen: &Specimen, params: &SolveParams) -> Source {
+        let (Some(_), Some(threshold)) = (&specimen.grey, &specimen.threshold) else {
+            return Source::Mask;
+        };
+        let of_body = match params.surface {
+            Some(of) => of == SurfaceOf::Body,
+            None => threshold.is_blur_given,
+        };
+        match threshold.blur_voxels.unwrap_or(0.0) {
+            sharp if sharp < BLURRED_VOXELS => Source::Sharpened,
+            sigma_voxels if of_body => Source::Deblurred { sigma_voxels },
+            _ => Source::Grey,
+        }
+    }
+
+    /// In a few words.
+    pub fn words(self) -> String {
+        match self {
+            Source::Grey => "surface of cubic interpolation of grey values".into(),
+            Source::Sharpened => "surface of cubic interpolation of grey values, corrected for the voxel's own box".into(),
+            Source::Deblurred { sigma_voxels } => format!(
+                "surface of cubic interpolation of grey values, corrected for a blur of {sigma_voxels:.2} voxels (standard deviation)"
+            ),
+            Source::Mask => "surface of a smoothed mask of the same volume, a guess".into(),
+        }
+    }
+
+    pub fn elements(self) -> Elements {
+        match self {
+            Source::Grey | Source::Sharpened => Elements::SmoothGrey,
+            Source::Deblurred { .. } => Elements::SmoothDeblurred,
+            Source::Mask => Elements::SmoothMask,
+        }
+    }
+}
+
 /// The surface of a specimen's bone; flat where the grid ends.
-pub fn of(specimen: &Specimen) -> Surface {
+pub fn of(specimen: &Specimen, source: Source) -> Surface {
     let (Some(grey), Some(threshold)) = (&specimen.grey, &specimen.threshold) else {
         return Surface::new(vec![smoothed(&specimen.bone)]);
     };
-    let values = match image(specimen) {
-        // The voxel's own box is the only blur.
-        Image::Grey { blur_voxels } if blur_voxels < BLURRED_VOXELS => upsample::sharpened(grey),
-        _ => grey.clone(),
+    let values = match source {
+        Source::Deblurred { sigma_voxels } => upsample::deblurred(grey, sigma_voxels),
+        Source::Sharpened => upsample::sharpened(grey),
+        Source::Grey | Source::Mask => grey.clone(),
     };
     let mut bounds = Vec::new();
     for (level, sign) in [(threshold.lower, 1.0), (threshold.upper, -1.0)] {
@@ -54,8 +107,7 @@ pub fn of(specimen: &Specimen) -> Surface {
 fn smoothed(mask: &Volume<u8>) -> Bound {
     let values = mask.as_slice().iter().map(|v| f32::from(u8::from(*v != 0)));
     let sharp = Volume::from_vec(mask.grid, values.collect());
-    let slabs = gaussian::map_slabs(&sharp, SMOOTHED_MASK, |v| v, |_, part| part.to_vec());
-    let values = Volume::from_vec(mask.grid, slabs.concat());
+    let values = gaussian::smoothed(&sharp, SMOOTHED_MASK);
     let bone = mask.as_slice().iter().filter(|v| **v != 0).count() as f64;
     let level = keeping_volume(&values, bone);
     Bound {
@@ -84,11 +136,6 @@ fn keeping_volume(values: &Volume<f32>, bone: f64) -> f32 {
         }
     }
     0.5 * (low + high)
-}
-
-/// Whether the surface follows from grey values, and not from a mask.
-pub fn is_of_grey(specimen: &Specimen) -> bool {
-    specimen.grey.is_some() && specimen.threshold.is_some()
 }
 
 /// The planes between cells along each axis: the grid's ends and the grips are among them.

@@ -7,9 +7,9 @@ use bonepd_ct::discretisation::tetrahedra::pieces::{Faces, pieces};
 use bonepd_ct::discretisation::tetrahedra::quality::{BOUNDS_DEGREES, euler, quality};
 use bonepd_ct::discretisation::tetrahedra::surface::{Bound, Surface};
 use bonepd_ct::grid::Grid;
+use bonepd_ct::mask::gaussian;
 use bonepd_ct::measure::pistoia::Pistoia;
 use bonepd_ct::pipeline::apparent::fields::Field;
-use bonepd_ct::mask::gaussian;
 use bonepd_ct::pipeline::apparent::{
     Ends, Load, Method, SolveParams, SurfaceOf, of_geometry, of_voxels, settled,
 };
@@ -492,9 +492,7 @@ fn blurred(n: [usize; 3], f: impl Fn([f64; 3]) -> f64) -> Specimen {
 #[test]
 fn a_surface_corrected_for_blur_has_the_stiffness_of_the_body() {
     const RADIUS: f64 = 3.3;
-    let bar = blurred([14, 14, 10], |p| {
-        RADIUS - (p[0] - 7.1).hypot(p[1] - 6.8)
-    });
+    let bar = blurred([14, 14, 10], |p| RADIUS - (p[0] - 7.1).hypot(p[1] - 6.8));
     let exact = 1000.0 * PI * RADIUS * RADIUS / 196.0;
     let of = |body: &Specimen, surface| {
         let asked = SolveParams {
@@ -506,13 +504,16 @@ fn a_surface_corrected_for_blur_has_the_stiffness_of_the_body() {
     };
     let image = of(&bar, Some(SurfaceOf::Image)) / exact - 1.0;
     let body = of(&bar, None) / exact - 1.0;
-    // By the variance over the square of the radius: 8.2 %.
-    assert!((-0.1..-0.06).contains(&image), "{image}");
+    // By the variance over the square of the radius: 8.3 %; the cubics between voxels blur a little more.
+    assert!((-0.11..-0.08).contains(&image), "{image}");
     assert!(body.abs() < 0.01, "{body}");
-    let plate = blurred([12, 8, 8], |p| 2.2 - (p[0] - 5.9).abs());
+    let plate = blurred([12, 8, 8], |p| 13.0 / 6.0 - (p[0] - 35.0 / 6.0).abs());
     let [image, body] = [SurfaceOf::Image, SurfaceOf::Body].map(|s| of(&plate, Some(s)));
-    let exact = 1000.0 * 4.4 / 12.0;
-    assert!((image / exact - 1.0).abs() < 0.01 && (body / exact - 1.0).abs() < 0.01, "{image} {body}");
+    let exact = 1000.0 * 13.0 / 36.0;
+    assert!(
+        (image / exact - 1.0).abs() < 0.01 && (body / exact - 1.0).abs() < 0.01,
+        "{image} {body}"
+    );
 }
 
 /// Two bars beside each other, a gap of 0.9 voxels between them: cells of the default size bridge it here and there. The size that is
@@ -521,7 +522,8 @@ fn a_surface_corrected_for_blur_has_the_stiffness_of_the_body() {
 fn elements_are_smaller_where_the_default_size_bridges_a_gap() {
     let pair = specimen(grey([17, 10, 12], |p| {
         let gap = (p[0] - 8.5).abs() - 0.55;
-        gap.min(7.0 - (p[0] - 8.5).abs()).min(4.0 - (p[1] - 5.0).abs())
+        gap.min(7.0 - (p[0] - 8.5).abs())
+            .min(4.0 - (p[1] - 5.0).abs())
     }));
     let open = SolveParams {
         element_mm: None,

@@ -14,8 +14,8 @@ use bonepd_ct::physics::plasticity::Plasticity;
 use bonepd_ct::pipeline::apparent::checks::needs_modulus;
 use bonepd_ct::pipeline::apparent::fields::Field;
 use bonepd_ct::pipeline::apparent::{
-    CoarsenBy, Conditions, Ends, HeldLabel, Load, LoadSteps, Method, MovedLabel, PushedLabel, Sed, SurfaceOf,
-    SolveParams,
+    CoarsenBy, Conditions, Ends, HeldLabel, Load, LoadSteps, Method, MovedLabel, PushedLabel, Sed,
+    SolveParams, SurfaceOf,
 };
 use bonepd_ct::result::answer::AnswerLine;
 use bonepd_ct::result::row::Row;

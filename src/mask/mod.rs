@@ -1,6 +1,7 @@
 //! From grey values to bone: other grids, smoothing, thresholds, volumes of interest, connected components.
 
 pub mod components;
+pub mod deblur;
 pub mod ends;
 pub mod gaussian;
 pub mod regrid;

@@ -3,7 +3,6 @@
 //! Cubic interpolation along each axis in turn (Keys 1981, doi 10.1109/TASSP.1981.1163711, a = −½). Beyond the ends of the
 //! grid values go on in a straight line.
 
-use super::gaussian;
 use crate::grid::Grid;
 use crate::volume::Volume;
 use rayon::prelude::*;
@@ -64,31 +63,10 @@ fn blend(out: &mut [f32], lines: [(&[f32], f32); 4]) {
 /// bodies of known modulus, 1/6 left 2.2 % RMS where none left 3.4 % (`reports/truth-set.csv`).
 const SHARPENING: f32 = 1.0 / 6.0;
 
-/// Variance of a voxel's box along an axis, in voxels².
-const VOXEL: f64 = 1.0 / 12.0;
-
 /// Values less a sixth of the sum of their second differences, for images whose only blur is the voxel's own box.
 pub fn sharpened(grey: &Volume<f32>) -> Volume<f32> {
-    less_curvature(grey, grey, SHARPENING)
-}
-
-/// σ in voxels of the smoothing under which second differences are taken, so that they do not follow noise.
-const NOISE_FREE: f64 = 0.5;
-
-/// Values corrected for a blur of `sigma_voxels` and the voxel's own box: less half the variance times the sum of second
-/// differences. A blur moves a surface towards its centres of curvature by half the variance times the sum of its curvatures, and
-/// this moves it back, to first order in the variance; a plane stays where it is.
-pub fn deblurred(grey: &Volume<f32>, sigma_voxels: f64) -> Volume<f32> {
-    let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
-    let smooth = gaussian::smoothed(grey, e("BONEPD_S", NOISE_FREE));
-    let share = 0.5 * (sigma_voxels.powi(2) + e("BONEPD_C", VOXEL));
-    less_curvature(grey, &smooth, share as f32)
-}
-
-/// Values less `share` of the sum of the second differences of `of`, which is on the same grid.
-fn less_curvature(grey: &Volume<f32>, of: &Volume<f32>, share: f32) -> Volume<f32> {
     let [nx, ny, nz] = grey.grid.n;
-    let values = of.as_slice();
+    let values = grey.as_slice();
     // Straight on beyond the ends: no second difference there.
     let second = |at: usize, i: usize, n: usize, stride: usize| match i > 0 && i + 1 < n {
         true => values[at - stride] - 2.0 * values[at] + values[at + stride],
@@ -104,7 +82,7 @@ fn less_curvature(grey: &Volume<f32>, of: &Volume<f32>, share: f32) -> Volume<f3
                 let sum = second(at, i % nx, nx, 1)
                     + second(at, i / nx, ny, nx)
                     + second(at, z, nz, nx * ny);
-                *v = grey.as_slice()[at] - share * sum;
+                *v = values[at] - SHARPENING * sum;
             }
         });
     let mut sharp = Volume::from_vec(grey.grid, sharp);

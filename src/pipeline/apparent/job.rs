@@ -11,8 +11,8 @@ use crate::pipeline::apparent::discretisation::{
 use crate::pipeline::apparent::ends::reactions::reactions;
 use crate::pipeline::apparent::equilibrium::{Observe, equilibrium};
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
-use crate::pipeline::apparent::mechanisms::mechanisms;
 use crate::pipeline::apparent::geometry_fe::topology::settled;
+use crate::pipeline::apparent::mechanisms::mechanisms;
 use crate::pipeline::apparent::params::{Load, SolveParams};
 use crate::pipeline::apparent::solved::{Moduli, Solved};
 use crate::pipeline::apparent::stiffness::{Stiffness, stiffness};

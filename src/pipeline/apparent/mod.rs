@@ -48,9 +48,9 @@ pub use crate::solver::cg::{CgStep, Ended};
 use crate::volume::Specimen;
 #[doc(hidden)]
 pub use discretisation::Discretisation;
+pub use fields::Field;
 #[doc(hidden)]
 pub use geometry_fe::topology::settled;
-pub use fields::Field;
 pub use params::{
     CoarsenBy, Conditions, Ends, HeldLabel, Load, LoadSteps, Method, MovedLabel, PushedLabel, Sed,
     SolveParams, SurfaceOf,

@@ -37,12 +37,7 @@ pub fn has_other_pieces(specimen: &Specimen) -> bool {
 ///
 /// # Errors
 /// Too many vertices.
-pub fn filled(
-    specimen: &Specimen,
-    surface: &Surface,
-    grips: &Grips,
-    size_mm: f64,
-) -> Result<Mesh> {
+pub fn filled(specimen: &Specimen, surface: &Surface, grips: &Grips, size_mm: f64) -> Result<Mesh> {
     let planes = surface::planes_mm(&specimen.bone.grid, size_mm, grips.axis, grips.low_mm);
     let lattice = Lattice::new(planes).ending_at(grips.axis, &[grips.low_mm, grips.high_mm]);
     fill(surface, &lattice)

@@ -2,7 +2,7 @@
 
 use crate::discretisation::tetrahedra::surface::{Bound, Surface};
 use crate::grid::Grid;
-use crate::mask::{gaussian, upsample};
+use crate::mask::{deblur, gaussian, upsample};
 use crate::pipeline::apparent::params::{SolveParams, SurfaceOf};
 use crate::result::settings::Elements;
 use crate::result::shape::BLURRED_VOXELS;
@@ -47,7 +47,10 @@ impl Source {
     pub fn words(self) -> String {
         match self {
             Source::Grey => "surface of cubic interpolation of grey values".into(),
-            Source::Sharpened => "surface of cubic interpolation of grey values, corrected for the voxel's own box".into(),
+            Source::Sharpened => {
+                "surface of cubic interpolation of grey values, corrected for the voxel's own box"
+                    .into()
+            }
             Source::Deblurred { sigma_voxels } => format!(
                 "surface of cubic interpolation of grey values, corrected for a blur of {sigma_voxels:.2} voxels (standard deviation)"
             ),
@@ -70,7 +73,7 @@ pub fn of(specimen: &Specimen, source: Source) -> Surface {
         return Surface::new(vec![smoothed(&specimen.bone)]);
     };
     let values = match source {
-        Source::Deblurred { sigma_voxels } => upsample::deblurred(grey, sigma_voxels),
+        Source::Deblurred { sigma_voxels } => deblur::deblurred(grey, sigma_voxels),
         Source::Sharpened => upsample::sharpened(grey),
         Source::Grey | Source::Mask => grey.clone(),
     };

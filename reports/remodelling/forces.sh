@@ -1,34 +1,35 @@
 #!/bin/sh
-# The femur driven by forces as published: both load cases at several horizons and as local continuum, their mixture, and variants of the
-# law on a coarser grid. What is finished already is not run again: sh reports/remodelling/forces.sh RUNS
+# The femur driven by forces as published, on a grid of 0.3: both load cases at three horizons and as local continuum, their mixture, and
+# variants of the law. What is finished already is not run again: sh reports/remodelling/forces.sh RUNS
 set -eu
 runs=$1
 here=$(dirname "$0")/../../pipelines
 outline=$(cd "$here/../sample_data" && pwd)/femur-outline.csv
 mkdir -p "$runs"
-scene() { # name of the run, scene file without .toml, sed commands
+scene() { # name of the run, scene file without .toml, horizon, sed commands
     name=$1
     file=$2
-    shift 2
+    horizon=$3
+    shift 3
     [ -e "$runs/$name/scene.json" ] && return
-    sed -e "s#\"../sample_data/femur-outline.csv\"#\"$outline\"#" "$@" "$here/$file.toml" > "$runs/$name.toml"
+    sed -e "s#\"../sample_data/femur-outline.csv\"#\"$outline\"#; s/^spacing = .*/spacing = 0.3/; s/^horizon = .*/horizon = $horizon/" \
+        -e 's/^step = .*/step = 0.4/' "$@" "$here/$file.toml" > "$runs/$name.toml"
     echo "$name"
     bonepd-ct scene "$runs/$name.toml" -o "$runs/$name" --threads 1
+}
+minus() { # line of [output]: the run to compare with
+    echo "\$a minus = \"$1\""
 }
 # The local twin: no horizon, and the density at Gauss points as in the scenes that displacements drive.
 local='/^horizon = /d; s/^\[physics.bond-based\]/[physics.continuum]\ndensity_at = "gauss"/'
 for case in lc1 lc2; do
-    scene forces-$case-continuum femur-$case-shear-forces -e "$local"
-    for horizon in 0.602 0.902 1.202; do
-        scene forces-$case-$horizon femur-$case-shear-forces -e "s/^horizon = .*/horizon = $horizon/" -e "\$a minus = \"forces-$case-continuum\""
+    scene $case-continuum femur-$case-shear-forces 0.9 -e "$local"
+    for horizon in 0.602 0.903 1.204; do
+        scene $case-$horizon femur-$case-shear-forces $horizon -e "$(minus $case-continuum)"
     done
 done
-scene forces-mixture femur-mixture
-scene forces-in-turn femur-in-turn -e '$a minus = "forces-mixture"'
-scene forces-cycles femur-cycles -e '$a minus = "forces-lc1-0.602"'
-# Variants on a grid of 0.4.
-coarse='s/^spacing = .*/spacing = 0.4/; s/^horizon = .*/horizon = 1.204/; s/0\.6\] }/0.8] }/; s/^step = .*/step = 0.4/'
-scene coarse-0.2 femur-lc1-shear-forces -e "$coarse"
-scene coarse-third femur-lc1-shear-forces -e "$coarse" -e '/^poisson/d' -e '$a minus = "coarse-0.2"'
-scene coarse-local femur-lc1-shear-forces -e "$coarse" -e "$local" -e '$a minus = "coarse-0.2"'
-scene coarse-neo-hooke femur-lc1-shear-forces -e "$coarse" -e "$local" -e 's/^young/energy = "neo-hooke"\nyoung/' -e '$a minus = "coarse-local"'
+scene mixture femur-mixture 0.903
+scene in-turn femur-in-turn 0.903 -e "$(minus mixture)"
+scene cycles femur-cycles 0.903 -e "$(minus lc1-0.903)"
+scene third femur-lc1-shear-forces 0.903 -e '/^poisson/d' -e "$(minus lc1-0.903)"
+scene neo-hooke femur-lc1-shear-forces 0.9 -e "$local" -e 's/^young/energy = "neo-hooke"\nyoung/' -e "$(minus lc1-continuum)"

@@ -14,7 +14,7 @@ import tomllib
 
 RUNS = pathlib.Path(sys.argv[1])
 HERE = pathlib.Path(__file__).resolve().parents[2] / "pipelines"
-HORIZONS = ["0.602", "0.902", "1.202"]
+HORIZONS = ["0.602", "0.903", "1.204"]
 KINDS = ["continuum", *HORIZONS]
 # Points that the forces of a load case meet at the head, and the one between them.
 HEAD = {"lc1": [(-8.67, 3.66), (-6.23, 3.85), (-10.22, 2.36)], "lc2": [(-8.15, 3.75)]}
@@ -82,11 +82,11 @@ def band(points, start, end, offset):
 
 
 def statements(case):
-    local = {t: change(f"forces-{case}-continuum", t) for t in (10, 280)}
+    local = {t: change(f"{case}-continuum", t) for t in (10, 280)}
     table(f"{case}: difference to the continuum", ["t", "mean", "95 %", "largest", "above 0.1 (%)", "above 0.3 (%)", "of these at head or trochanter (%)"])
     for horizon in HORIZONS:
         for t in (10, 280):
-            here = change(f"forces-{case}-{horizon}", t)
+            here = change(f"{case}-{horizon}", t)
             assert here.keys() == local[t].keys()
             size = {p: abs(v - local[t][p]) for p, v in here.items()}
             ordered = sorted(size.values())
@@ -96,8 +96,8 @@ def statements(case):
             share = lambda limit: 100 * sum(v > limit for v in ordered) / n
             print(f"| {horizon} | {t} | {mean(ordered):.4f} | {ordered[(n - 1) * 95 // 100]:.4f} | {ordered[-1]:.2f} | {share(0.1):.1f} | {share(0.3):.2f} | "
                   f"{100 * len(there) / len(large) if large else math.nan:.0f} |")
-    runs = {kind: change(f"forces-{case}-{kind}", 280) for kind in KINDS}
-    early = {kind: change(f"forces-{case}-{kind}", 10) for kind in KINDS}
+    runs = {kind: change(f"{case}-{kind}", 280) for kind in KINDS}
+    early = {kind: change(f"{case}-{kind}", 10) for kind in KINDS}
     table(case, KINDS)
     at_head = {k: {p: v for p, v in f.items() if min(math.dist(p, h) for h in HEAD[case]) < 1.2} for k, f in runs.items()}
     around = {k: [v for p, v in f.items() if 1.2 <= min(math.dist(p, h) for h in HEAD[case]) < 2.4] for k, f in runs.items()}
@@ -114,11 +114,11 @@ def statements(case):
     for height in (-4.05, -5.05):
         loosest = []
         for k in KINDS:
-            line = [(x, v) for (x, y), v in runs[k].items() if abs(y - height) < 0.1 and -4.5 < x < 3]
+            line = [(x, v) for (x, y), v in runs[k].items() if abs(y - height) < 0.15 and -4.5 < x < 3]
             loosest.append(min(line, key=lambda e: e[1])[0])
         row(f"loosest place on y = {height}, x", loosest, 2)
     for k in KINDS:
-        line = sorted((x, v) for (x, y), v in runs[k].items() if abs(y + 18) < 0.11)
+        line = sorted((x, v) for (x, y), v in runs[k].items() if abs(y + 18) < 0.15)
         print(f"{case}, {k}, y = -18, medial to lateral:", ", ".join(f"{v:.2f}" for _, v in line))
 
 
@@ -138,9 +138,9 @@ def costs():
 
 
 for t in (10, 280):
-    means(t, [f"forces-{case}-{kind}" for case in ("lc1", "lc2") for kind in KINDS])
-means(280, ["forces-lc1-0.602", "forces-lc2-0.602", "forces-mixture", "forces-in-turn", "forces-cycles"])
-means(280, ["coarse-0.2", "coarse-third", "coarse-local", "coarse-neo-hooke"])
+    means(t, [f"{case}-{kind}" for case in ("lc1", "lc2") for kind in KINDS])
+means(280, ["lc1-0.903", "lc2-0.903", "mixture", "in-turn", "cycles"])
+means(280, ["lc1-0.903", "third", "lc1-continuum", "neo-hooke"])
 for case in ("lc1", "lc2"):
     statements(case)
 likeness()

@@ -36,7 +36,7 @@ impl BondBasedParams {
                 key("poisson"),
                 format!("found {}", self.poisson),
                 "give a Poisson's ratio from -0.99 to 1/3 (plane stress): above 1/3 bonds would have to push where they are sheared, and \
-                 the body is not stable; [physics.continuum] takes any",
+                 the body is not stable; [physics.continuum] takes -0.99 to 0.99",
             ));
         }
         match self.micromodulus {

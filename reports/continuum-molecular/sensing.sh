@@ -5,8 +5,8 @@ set -eu
 runs=$1
 here=$(dirname "$0")/../../pipelines
 mkdir -p "$runs"
-for angle in 0 45 60 90; do
-    for slope in 0 -2.4 -24; do
+for slope in 0 -24 -2.4; do
+    for angle in 0 45 60 90; do
         name=damage-sensing-$angle-slope$slope
         [ -e "$runs/$name/scene.json" ] && continue
         sed -e "s/^angle_deg = 0/angle_deg = $angle/; s/^piezoresistance = .*/piezoresistance = $slope/" "$here/scene-damage-sensing.toml" > "$runs/$name.toml"

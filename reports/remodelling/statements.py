@@ -61,6 +61,12 @@ def row(name, values, digits=3):
     print(f"| {name} | " + " | ".join("-" if v is None or v != v else f"{v:.{digits}f}" for v in values) + " |")
 
 
+def line(points, height):
+    """Places and values along the row of points nearest to a height."""
+    row = min({y for _, y in points}, key=lambda y: (abs(y - height), y))
+    return sorted((x, v) for (x, y), v in points.items() if y == row)
+
+
 def table(title, columns):
     print(f"\n| {title} | {' | '.join(columns)} |\n|{'---|' * (len(columns) + 1)}")
 
@@ -112,14 +118,11 @@ def statements(case):
     for name, start, end in (("secondary compressive", (-3.0, -8.5), (2.2, -2.6)), ("secondary tensile", (2.9, -7.5), (-1.6, -3.2))):
         row(f"{name} band less its neighbours", [band(runs[k], start, end, 0) - 0.5 * (band(runs[k], start, end, 0.8) + band(runs[k], start, end, -0.8)) for k in KINDS])
     for height in (-4.05, -5.05):
-        loosest = []
-        for k in KINDS:
-            line = [(x, v) for (x, y), v in runs[k].items() if abs(y - height) < 0.15 and -4.5 < x < 3]
-            loosest.append(min(line, key=lambda e: e[1])[0])
+        inner = [[(v, x) for x, v in line(runs[k], height) if -4.5 < x < 3] for k in KINDS]
+        loosest = [min(one)[1] for one in inner]
         row(f"loosest place on y = {height}, x", loosest, 2)
     for k in KINDS:
-        line = sorted((x, v) for (x, y), v in runs[k].items() if abs(y + 18) < 0.15)
-        print(f"{case}, {k}, y = -18, medial to lateral:", ", ".join(f"{v:.2f}" for _, v in line))
+        print(f"{case}, {k}, y = -18, medial to lateral:", ", ".join(f"{v:.2f}" for _, v in line(runs[k], -18)))
 
 
 def likeness():

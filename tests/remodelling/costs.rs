@@ -37,7 +37,10 @@ fn cost(model: &str) -> (usize, BTreeMap<String, usize>) {
     let mut sizes = Sizes::default();
     let summary = run(&scene, &Inputs::default(), &mut sizes).unwrap();
     assert_eq!((summary.points, summary.converged), (48, true));
-    sizes.0.retain(|_, size| *size >= summary.points);
+    // Where a factor was made is told in copies of the same arrays.
+    sizes
+        .0
+        .retain(|name, size| *size >= summary.points && !name.starts_with("factor."));
     (summary.unknowns, sizes.0)
 }
 
@@ -46,10 +49,10 @@ fn sizes<const N: usize>(of: [(&str, usize); N]) -> BTreeMap<String, usize> {
 }
 
 /// Without `poisson`, `cases` and growth there are two unknowns a point and no rotations; what was added later adds its own values and no
-/// others. Two columns of four points are held along x, one point along y. No array is as long as the list of bonds.
+/// others. One column of four points is held along x, one point along y. No array is as long as the list of bonds.
 #[test]
 fn what_is_not_asked_for_is_not_stored() {
-    let (n, held) = (48, 8 + 1);
+    let (n, held) = (48, 4 + 1);
     let growth = "growth = { rate = 1e5, stimulus = 5e-7 }";
     let cases = "cases = [{ name = 'a', weight = 1 }, { name = 'b', weight = 2 }]";
     let plain = cost("");

@@ -83,7 +83,11 @@ fn heat_strains_a_free_body_without_stress() {
         assert!(scale > 0.0, "{}", m.name);
         for motion in &m.free {
             let sum = dot(motion, &forces).abs();
-            assert!(sum < 1e-12 * scale * forces.len() as f64, "{}: {sum:e}", m.name);
+            assert!(
+                sum < 1e-12 * scale * forces.len() as f64,
+                "{}: {sum:e}",
+                m.name
+            );
         }
         let values = m.diagonal.len() / at.len();
         let some = if m.bends { 1 } else { 2 };

@@ -32,7 +32,11 @@ impl Observer for Sizes {
 
 /// Unknowns, and the sizes of the arrays that depend on the number of points, of a bar of 12 x 4 points.
 fn cost(model: &str) -> (usize, BTreeMap<String, usize>) {
-    let text = bar(4, 1e-5, &format!("{model}\n solver = {{ method = 'newton' }}"));
+    let text = bar(
+        4,
+        1e-5,
+        &format!("{model}\n solver = {{ method = 'newton' }}"),
+    );
     let scene = Scene::parse(&text, Path::new("test.toml")).unwrap();
     let mut sizes = Sizes::default();
     let summary = run(&scene, &Inputs::default(), &mut sizes).unwrap();
@@ -57,18 +61,30 @@ fn what_is_not_asked_for_is_not_stored() {
     let cases = "cases = [{ name = 'a', weight = 1 }, { name = 'b', weight = 2 }]";
     let plain = cost("");
     let places = 2 * n - held;
-    assert_eq!(plain, (places, sizes([("q", places), ("values", 3 * n), ("old", n)])));
+    assert_eq!(
+        plain,
+        (
+            places,
+            sizes([("q", places), ("values", 3 * n), ("old", n)])
+        )
+    );
     // Poisson's ratio of bonds under stretch alone is no other model.
     assert_eq!(cost("poisson = 0.3333333333333333"), plain);
     let growing = places + n;
     assert_eq!(
         cost(growth),
-        (growing, sizes([("q", growing), ("values", 3 * n), ("old", n)]))
+        (
+            growing,
+            sizes([("q", growing), ("values", 3 * n), ("old", n)])
+        )
     );
     let turning = 3 * n - held;
     assert_eq!(
         cost("poisson = 0.2"),
-        (turning, sizes([("q", turning), ("values", 4 * n), ("old", n)]))
+        (
+            turning,
+            sizes([("q", turning), ("values", 4 * n), ("old", n)])
+        )
     );
     // Load cases share densities.
     let both = n + 2 * turning;
@@ -79,6 +95,9 @@ fn what_is_not_asked_for_is_not_stored() {
     let central = n + 2 * places;
     assert_eq!(
         cost(&format!("{cases}\n {growth}")),
-        (central, sizes([("q", central), ("values", 5 * n), ("old", n)]))
+        (
+            central,
+            sizes([("q", central), ("values", 5 * n), ("old", n)])
+        )
     );
 }

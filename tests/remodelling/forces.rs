@@ -39,7 +39,11 @@ fn loads_and_supports_that_do_nothing_are_refused() {
     let text = pulled(0.01, "");
     let left = "[[load]]\n         region = { edge = 'left' }";
     for (old, new, words) in [
-        ("[[load]]\n         region = { edge = 'right' }", left, "the support takes the force"),
+        (
+            "[[load]]\n         region = { edge = 'right' }",
+            left,
+            "the support takes the force",
+        ),
         (
             "[[load]]\n         region = { edge = 'right' }",
             "[[load]]\n         region = { point = [3.0, 0.05] }",
@@ -50,7 +54,11 @@ fn loads_and_supports_that_do_nothing_are_refused() {
             "[[hold]]\n         region = { edge = 'bottom' }",
             "the body can turn",
         ),
-        ("poisson = 0.3", "poisson = 1.2", "physics.continuum.poisson"),
+        (
+            "poisson = 0.3",
+            "poisson = 1.2",
+            "physics.continuum.poisson",
+        ),
         ("young = 2.0", "young = -2.0", "physics.continuum.young"),
     ] {
         assert!(text.contains(old), "{old}");

@@ -63,12 +63,7 @@ fn rigid<const D: usize>(points: &Points, m: usize) -> Vec<f64> {
     points.positions().into_iter().flat_map(of).collect()
 }
 
-fn body_row<const D: usize>(
-    name: &str,
-    body: Body<D>,
-    bends: bool,
-    free: Vec<Vec<f64>>,
-) -> Model {
+fn body_row<const D: usize>(name: &str, body: Body<D>, bends: bool, free: Vec<Vec<f64>>) -> Model {
     let n = body.sites();
     let mut diagonal = vec![[0.0; D]; n];
     body.diagonal(&mut diagonal);
@@ -242,7 +237,13 @@ fn shear_bonds_row() -> Model {
     };
     let free = (0..6).map(|k| of_case(k / 3, k % 3)).collect();
     let pattern = model.pattern_from(&map, 0);
-    stiffness_row("remodelling, bonds that shear", &step, pattern, &places, free)
+    stiffness_row(
+        "remodelling, bonds that shear",
+        &step,
+        pattern,
+        &places,
+        free,
+    )
 }
 
 fn bond_based_row() -> Model {

@@ -8,7 +8,7 @@ use crate::scene::setting::Setting;
 /// `held` are the values of points one after the other, `D` of each.
 ///
 /// # Errors
-/// A load on points that are all held in its component.
+/// A load on points that are all held in its component, unless the whole body is.
 pub fn loads<const D: usize>(
     scene: &Setting,
     setup: &Setup,
@@ -22,7 +22,8 @@ pub fn loads<const D: usize>(
         };
         let (key, n) = (format!("load[{k}].region"), setup.points.len());
         let chosen = load.region.select(&setup.points, n, &key)?;
-        if chosen.iter().all(|p| held[p * D + d].is_some()) {
+        let moves = (0..n).any(|p| held[p * D + d].is_none());
+        if moves && chosen.iter().all(|p| held[p * D + d].is_some()) {
             return Err(Error::setting(
                 key,
                 format!(

@@ -359,28 +359,30 @@ fn a_slice_of_a_segmented_scan_remodels() {
         .args(["--lower", "200", "--upper", "5600"])
         .assert()
         .success();
-    let text = std::fs::read_to_string(pipelines().join("scan-slice.toml")).unwrap();
-    assert!(text.contains(
-        "bonepd-ct segment sample_data/dense.nii.gz -o out/dense --lower 200 --upper 5600"
-    ));
-    let text = text
-        .replace("../out", "out")
-        .replace("../sample_data", "sample_data");
     std::fs::create_dir(dir.path().join("sample_data")).unwrap();
     std::fs::copy(&sample, dir.path().join("sample_data/dense.nii.gz")).unwrap();
-    let scene = dir.path().join("scan-slice.toml");
-    std::fs::write(&scene, text).unwrap();
-    let out = dir.path().join("scene");
-    bonepd()
-        .arg("scene")
-        .arg(&scene)
-        .arg("-o")
-        .arg(&out)
-        .assert()
-        .success();
-    // Some bone is resorbed to the least density, some is laid down.
-    assert!((last(&out, "min") + 0.95).abs() < 1e-6);
-    assert!(last(&out, "max") > 0.1);
+    for name in ["scan-slice", "scan-slice-forces"] {
+        let text = std::fs::read_to_string(pipelines().join(format!("{name}.toml"))).unwrap();
+        assert!(text.contains(
+            "bonepd-ct segment sample_data/dense.nii.gz -o out/dense --lower 200 --upper 5600"
+        ));
+        let text = text
+            .replace("../out", "out")
+            .replace("../sample_data", "sample_data");
+        let scene = dir.path().join(format!("{name}.toml"));
+        std::fs::write(&scene, text).unwrap();
+        let out = dir.path().join(name);
+        bonepd()
+            .arg("scene")
+            .arg(&scene)
+            .arg("-o")
+            .arg(&out)
+            .assert()
+            .success();
+        // Some bone is resorbed to the least density, some is laid down.
+        assert!((last(&out, "min") + 0.95).abs() < 1e-6, "{name}");
+        assert!(last(&out, "max") > 0.1, "{name}");
+    }
 }
 
 /// Nothing loads the body: densities fall until none is left. The program stops, says so, and keeps the last state.

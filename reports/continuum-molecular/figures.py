@@ -94,6 +94,51 @@ def compact_tension():
     save("potential-drop")
 
 
+def sensed(h):
+    """Opening, crack extension, and drop over its first value, at accepted loads."""
+    drop = h["potential_drop"]
+    kept = [i for i in range(len(drop)) if i == 0 or drop[i] != drop[i - 1]]
+    return [(h["t"][i], h["crack_length"][i], drop[i] / drop[0]) for i in kept]
+
+
+def damage_sensing():
+    """The runs of sensing.sh: what strain adds to the drop that the crack makes."""
+    figure, axes = plt.subplots(1, 2, figsize=(8.6, 3.4))
+    drawn = False
+    for k, z in enumerate((0, 45, 60, 90)):
+        found = {s: history(f"damage-sensing-{z}-slope{s}") for s in ("0", "-2.4", "-24")}
+        found = {s: sensed(h) for s, h in found.items() if h}
+        if "0" not in found:
+            continue
+        drawn = True
+        plain = found["0"]
+        axes[0].plot([c for _, c, _ in plain], [r for *_, r in plain], DASHES[k], color=HUES[k], marker=MARKS[k], ms=3, label=f"{z}°")
+        for slope in ("-2.4", "-24"):
+            if slope not in found:
+                continue
+            added = [(t, c, 100 * (r / p - 1)) for (t, c, r), (u, d, p) in zip(found[slope], plain) if t == u and c == d]
+            assert len(added) == min(len(plain), len(found[slope])), "the cracks differ"
+            whole = [a for a in added if a[1] == 0]
+            most = max(added, key=lambda a: a[2])
+            print(f"damage sensing, {z} degrees, slope {slope}: strain adds {whole[-1][2]:.3f} % at an opening of {whole[-1][0]:.3f} mm before the first "
+                  f"break, at most {most[2]:.3f} % at {most[0]:.3f} mm and a crack of {most[1]:.1f} mm, {added[-1][2]:.3f} % at the end")
+            if slope == "-24":
+                axes[1].plot([t for t, *_ in added], [a for *_, a in added], DASHES[k], color=HUES[k], lw=1, label=f"{z}°")
+        for wanted in (1, 2.5, 4.5, 6.5, 8.5, 10, 12):
+            t, c, r = min(plain, key=lambda p: abs(p[1] - wanted))
+            print(f"damage sensing, {z} degrees: crack {c:.1f} mm at {t:.3f} mm, drop {r:.3f}"
+                  + "".join(f", slope {s} {next((q for u, _, q in found[s] if u == t), math.nan):.3f}" for s in found if s != "0"))
+    if not drawn:
+        return plt.close()
+    axes[0].set_xlabel("crack extension (mm)")
+    axes[0].set_ylabel("potential drop over its first value, Π = 0")
+    axes[1].set_xlabel("opening of the pins (mm)")
+    axes[1].set_ylabel("added by strain, Π = -24 (%)")
+    for axis in axes:
+        axis.legend(title="bone's axis", fontsize=7)
+    save("damage-sensing")
+
+
 def slopes():
     """Inclination of each crack of the compact tension runs, by its distance from the slit's end: the principal axis of
     the points that have lost more than 0.4 of their bonds."""
@@ -266,9 +311,11 @@ maps("plate", [f"notched-plate/damage_t{t}.png" for t in ("0.4", "0.8", "1.3")])
 maps("inclusion", ["square-inclusion/damage_t0.02.png"])
 maps("plate-modes", [f"plate-modes/magnitude_t{t}.png" for t in (4, 5, 7, 8)])
 maps("tetrachiral", [f"tetrachiral-modes/magnitude_t{t}.png" for t in (4, 5, 7)])
+maps("strain-sensing", [f"strain-sensing/potential_t{z}.png" for z in (0, 45, 60, 90)])
 maps("compact-tension", [f"compact-tension-{z}/damage_t0.4.png" for z in (0, 45, 60, 90)])
 energy_angle()
 plate()
 compact_tension()
+damage_sensing()
 slopes()
 kinking()

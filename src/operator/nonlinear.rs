@@ -25,6 +25,13 @@ pub trait Staggered: Nonlinear {
     fn stiffness(&self, q: &[f64], k: &mut Sparse);
 }
 
+/// The largest share of `dq`, at most 1, under which none of the first `local` unknowns, all positive, loses more than 70 %.
+pub fn positive_share(local: usize, q: &[f64], dq: &[f64]) -> f64 {
+    let loss = |k: usize| -dq[k] / q[k];
+    let worst = (0..local).map(loss).fold(0.0, f64::max);
+    (0.7 / worst.max(1e-300)).min(1.0)
+}
+
 /// A body whose forces depend on displacements and on what happened before, step by step. Everything is the free body: supports are
 /// given to the solver separately, as held components.
 pub trait Incremental: Sync {

@@ -18,7 +18,7 @@ pub enum Region {
     Disc([f64; 3]),
     /// Outside a circle: `[centre x, centre y, radius]`, border excluded.
     Outside([f64; 3]),
-    /// The point nearest to `[x, y]`.
+    /// The point nearest to `[x, y]`, at most two spacings away.
     Point([f64; 2]),
     /// Inside a polygon.
     Polygon(Vec<[f64; 2]>),
@@ -28,9 +28,12 @@ impl Region {
     /// Points among the first `count` that belong to the region. An empty region is refused, naming `key`.
     pub fn select(&self, points: &Points, count: usize, key: &str) -> Result<Vec<usize>> {
         let chosen: Vec<usize> = match self {
-            Region::Point(p) => points.nearest(*p).into_iter().collect(),
+            Region::Point(p) => points.nearest(*p).into_iter().collect::<Vec<_>>(),
             _ => (0..count).filter(|&i| self.holds(points, i)).collect(),
         };
+        if let (Region::Point(wanted), [found]) = (self, chosen.as_slice()) {
+            require_near(points, *wanted, *found, key)?;
+        }
         if chosen.is_empty() {
             return Err(Error::setting(
                 key,
@@ -61,6 +64,24 @@ impl Region {
             }
         }
     }
+}
+
+/// # Errors
+/// A point that stands for a place outside the geometry.
+fn require_near(points: &Points, wanted: [f64; 2], found: usize, key: &str) -> Result<()> {
+    let [x, y] = points.position(found);
+    let distance = (x - wanted[0]).hypot(y - wanted[1]);
+    if distance <= 2.0 * points.spacing {
+        return Ok(());
+    }
+    Err(Error::setting(
+        key,
+        format!(
+            "no point of the geometry lies at [{}, {}]: the nearest is [{x:.4}, {y:.4}], {distance:.4} away",
+            wanted[0], wanted[1]
+        ),
+        "give a place on the body",
+    ))
 }
 
 /// A value over time.

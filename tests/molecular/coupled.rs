@@ -189,6 +189,34 @@ fn a_breaking_strip_senses_its_strain() {
     );
 }
 
+/// Probes off the body or at one point, and a current into a held edge, would give a change of 0/0.
+#[test]
+fn a_gauge_that_shows_nothing_is_refused() {
+    let gauge = |edge: &str, probes: &str| {
+        plate(
+            &format!(
+                "hold = [{{ region = {{ edge = 'left' }}, component = 'potential' }}]
+                load = [{{ region = {{ edge = '{edge}' }}, component = 'potential', value = 1 }}]"
+            ),
+            &format!(
+                "elasticity = {{ young = 1000, poisson = 0.2 }}
+                known = [{{ region = 'all', field = {{ strain = [1e-3, 0, 0] }} }}]
+                conduction = {{ conductivity = [2, 2, 0], probes = {probes}, piezoresistance = -3 }}"
+            ),
+        )
+    };
+    let apart = "[[4.5, 0.5], [-4.5, 0.5]]";
+    solved(&gauge("right", apart));
+    for (edge, probes, words) in [
+        ("left", apart, "the support takes the load"),
+        ("right", "[[400, 0.5], [-4.5, 0.5]]", "conduction.probes[0]"),
+        ("right", "[[4.5, 0.5], [4.6, 0.4]]", "the same point"),
+    ] {
+        let error = refused(&gauge(edge, probes));
+        assert!(error.contains(words), "{words}: {error}");
+    }
+}
+
 #[test]
 fn couplings_that_are_none_or_two_are_refused() {
     let steel = "elasticity = { young = 1000, poisson = 0.2 }";

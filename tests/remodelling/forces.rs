@@ -33,6 +33,40 @@ fn pulled(force: f64, model: &str) -> String {
     )
 }
 
+/// A force that a support takes, a place off the body, and a body that turns about its one held point.
+#[test]
+fn loads_and_supports_that_do_nothing_are_refused() {
+    let text = pulled(0.01, "");
+    let left = "[[load]]\n         region = { edge = 'left' }";
+    for (old, new, words) in [
+        (
+            "[[load]]\n         region = { edge = 'right' }",
+            left,
+            "the support takes the force",
+        ),
+        (
+            "[[load]]\n         region = { edge = 'right' }",
+            "[[load]]\n         region = { point = [3.0, 0.05] }",
+            "the nearest is [0.5000, 0.0500], 2.5000 away",
+        ),
+        (
+            "[[hold]]\n         region = { edge = 'left' }",
+            "[[hold]]\n         region = { edge = 'bottom' }",
+            "the body can turn",
+        ),
+        (
+            "poisson = 0.3",
+            "poisson = 1.2",
+            "physics.continuum.poisson",
+        ),
+        ("young = 2.0", "young = -2.0", "physics.continuum.young"),
+    ] {
+        assert!(text.contains(old), "{old}");
+        let error = simulate(&text.replace(old, new)).map(|_| ()).unwrap_err();
+        assert!(error.to_string().contains(words), "{words}: {error}");
+    }
+}
+
 /// St. Venant-Kirchhoff under uniaxial tension: force = height x E e sqrt(1 + 2 e), with e the Green-Lagrange strain along
 /// the bar. All of it counts from the undeformed body.
 #[test]

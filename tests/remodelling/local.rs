@@ -64,6 +64,24 @@ fn a3_local_references() {
     assert_near(finer, found, 1e-8);
 }
 
+/// By `reports/remodelling/local_limits.py`. A bar under uniaxial strain of St. Venant-Kirchhoff does not depend on Poisson's ratio, of
+/// Neo-Hooke it does.
+#[test]
+fn local_references_of_neo_hooke() {
+    let table = [
+        (0.2, [-0.315329, 0.057495, 0.505811, 1.027310]),
+        (0.3, [-0.319322, 0.049914, 0.493070, 1.007626]),
+    ];
+    for (poisson, exact) in table {
+        for place in ["nodes", "gauss"] {
+            let model =
+                format!("energy = 'neo-hooke'\n poisson = {poisson:?}\n density_at = '{place}'");
+            let found = continuum_square(1, S2, false, &model).means([2.0, 4.0, 6.0, 8.0]);
+            assert_near(found, exact, SIX_DIGITS);
+        }
+    }
+}
+
 #[test]
 fn a3_in_compression_the_gap_changes_sign() {
     let steps = S2.map(|u| -u);

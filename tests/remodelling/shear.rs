@@ -1,5 +1,5 @@
-//! Bonds that resist shear, forces on bonds, and load cases. References are those of an independent prototype (0-D, Python) that meets
-//! those of spec A3 to all digits at ν = 1/3.
+//! Bonds that resist shear, forces on bonds, and load cases. References are those of `reports/remodelling/local_limits.py` (one point),
+//! which meets those of spec A3 to all digits at ν = 1/3.
 
 use super::square::{S2, SIX_DIGITS, Square, assert_near, local_text, simulate};
 use super::tangent::tangent_errors;
@@ -134,7 +134,7 @@ fn peridynamics_tends_to_the_limit_of_its_poissons_ratio() {
 }
 
 /// A bar of height 1 and length 3, `n` points high, pulled by a force, without growth unless `model` has it.
-fn bar(n: usize, force: f64, model: &str) -> String {
+pub fn bar(n: usize, force: f64, model: &str) -> String {
     let h = 1.0 / n as f64;
     format!(
         "title = 'pulled bar'

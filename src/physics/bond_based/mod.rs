@@ -7,15 +7,17 @@
 
 mod kernel;
 pub mod shear;
+mod step;
 
 use crate::discretisation::plane::Points;
 use crate::discretisation::plane::family::{Bond, Family, Stencil};
-use crate::operator::nonlinear::{Nonlinear, Staggered};
+use crate::operator::nonlinear::{Nonlinear, Staggered, positive_share};
 use crate::operator::reduction::Reduction;
 use crate::operator::sparse::Sparse;
 use crate::physics::growth::{Growth, Weight};
 use kernel::Padded;
 pub use kernel::PointState;
+pub use step::{Bonds, Step};
 
 /// Bonds, their stiffness and their density law. Unit thickness.
 #[derive(Debug, Clone)]
@@ -53,18 +55,6 @@ pub fn micromodulus_continuous(young: f64, stencil: &Stencil) -> f64 {
 /// `C` for the sum over the stencil: `6 E / Σ L V`.
 pub fn micromodulus_discrete(young: f64, stencil: &Stencil) -> f64 {
     6.0 * young / stencil.integrate(|b| b.length)
-}
-
-/// One time step's equations: unknowns through `map`, held values in `given` (`x = T q + g`).
-pub struct Step<'a> {
-    pub model: &'a BondBased,
-    pub map: &'a Reduction,
-    pub given: &'a [f64],
-    /// Densities of the material points before the step.
-    pub old: &'a [f64],
-    pub dt: f64,
-    /// Force on each value (placements only); empty: none.
-    pub load: &'a [f64],
 }
 
 /// A bond seen from one end.
@@ -169,13 +159,21 @@ impl BondBased {
     }
 }
 
-impl Step<'_> {
-    fn expand(&self, q: &[f64]) -> Vec<f64> {
-        let mut values = vec![0.0; self.map.values()];
-        self.map.expand(q, self.given, &mut values);
-        values
+impl Bonds for BondBased {
+    fn family(&self) -> &Family {
+        &self.family
     }
 
+    fn shares(&self) -> Option<&[f64]> {
+        self.shares.as_deref()
+    }
+
+    fn points(&self) -> usize {
+        self.points
+    }
+}
+
+impl Step<'_> {
     fn equation(&self, states: &[PointState], values: &[f64], value: usize) -> f64 {
         let model = self.model;
         let PointState { energy, force, .. } = states[model.point_of(value)];
@@ -188,13 +186,6 @@ impl Step<'_> {
             }
             (None, None) => 0.0,
         }
-    }
-
-    /// Force density of the load on a value of point `a`.
-    fn load_at(&self, value: usize, a: usize) -> f64 {
-        let share = self.model.shares.as_ref().map_or(1.0, |s| s[a]);
-        let cell = share * self.model.family.stencil.spacing.powi(2);
-        self.load.get(value).map_or(0.0, |f| f / cell)
     }
 
     /// Row of a density's equation (eqs A1 and A2).
@@ -240,12 +231,6 @@ impl Step<'_> {
         }
     }
 
-    fn put(&self, value: usize, by: f64, add: &mut impl FnMut(usize, f64)) {
-        if let Some(column) = self.map.unknown(value) {
-            add(column, by);
-        }
-    }
-
     fn gather(&self, values: &[f64], row: usize, add: &mut impl FnMut(usize, f64)) {
         let value = self.map.equation(row);
         let points = self.model.points;
@@ -283,15 +268,13 @@ impl Nonlinear for Step<'_> {
 
     /// No density may lose more than 70 % at once.
     fn share(&self, q: &[f64], dq: &[f64]) -> f64 {
-        let loss = |k: usize| -dq[k] / q[k];
-        let worst = (0..self.local()).map(loss).fold(0.0, f64::max);
-        (0.7 / worst.max(1e-300)).min(1.0)
+        positive_share(self.local(), q, dq)
     }
 }
 
 impl Staggered for Step<'_> {
     fn local(&self) -> usize {
-        self.map.unknowns_before(self.model.points)
+        self.densities()
     }
 
     fn local_diagonal(&self, q: &[f64], diagonal: &mut [f64]) {

@@ -14,6 +14,7 @@ mod step;
 
 pub use step::ShearStep;
 
+use super::Bonds;
 use crate::discretisation::plane::family::{Bond, Family, Stencil};
 use crate::operator::reduction::Reduction;
 use crate::operator::sparse::Sparse;
@@ -71,6 +72,20 @@ pub struct ShearBonds {
     pub cases: Vec<f64>,
     /// Whether points turn.
     pub turns: bool,
+}
+
+impl Bonds for ShearBonds {
+    fn family(&self) -> &Family {
+        &self.family
+    }
+
+    fn shares(&self) -> Option<&[f64]> {
+        self.shares.as_deref()
+    }
+
+    fn points(&self) -> usize {
+        self.points
+    }
 }
 
 /// What the bonds of a point sum to in one case: its energy density, that by its own density, and its force and moment densities.

@@ -1,7 +1,7 @@
 //! Owns the equations of one time step of the local twin: residual, tangent, and what may change at once.
 
 use super::{Continuum, N, Old, Point, Row};
-use crate::operator::nonlinear::{Nonlinear, Staggered};
+use crate::operator::nonlinear::{Nonlinear, Staggered, positive_share};
 use crate::operator::reduction::Reduction;
 use crate::operator::sparse::{Rows, Sparse};
 use rayon::prelude::*;
@@ -203,9 +203,7 @@ impl Nonlinear for Step<'_> {
     /// No density may lose more than 70 % at once, and no element turn inside out: beyond that St. Venant-Kirchhoff has
     /// further equilibria, which an update that shoots too far finds.
     fn share(&self, q: &[f64], dq: &[f64]) -> f64 {
-        let loss = |k: usize| -dq[k] / q[k];
-        let worst = (0..self.local()).map(loss).fold(0.0, f64::max);
-        let mut share = (0.7 / worst.max(1e-300)).min(1.0);
+        let mut share = positive_share(self.local(), q, dq);
         let upright = |share: f64| {
             let moved: Vec<f64> = q.iter().zip(dq).map(|(q, d)| q + share * d).collect();
             self.model.is_upright(&self.expand(&moved))

@@ -17,4 +17,5 @@ pub mod piezoresistance;
 pub mod small;
 pub mod tensor;
 pub mod tetrachiral;
+pub mod thermal;
 pub mod toughness;

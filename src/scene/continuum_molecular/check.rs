@@ -2,6 +2,7 @@
 //! find that out is what the solution starts from.
 
 mod components;
+mod idle;
 mod numbers;
 mod unused;
 
@@ -142,6 +143,7 @@ fn elastic<const D: usize>(
         _ => {
             let names: [&[&str]; D] = std::array::from_fn(|d| DISPLACEMENT[d]);
             loads(scene, model, setup, names, 1.0)?;
+            idle::loads(scene, setup, names, &solid.held)?;
         }
     }
     Ok(solid)
@@ -156,6 +158,10 @@ fn conducting(
     let conductor = setup.conductor(model, conduction)?;
     let held = setup.held(scene, model, CONDUCTED, 0.0, None)?;
     loads(scene, model, setup, CONDUCTED, 0.0)?;
+    idle::loads(scene, setup, CONDUCTED, &held)?;
+    if let Some(probes) = model.problem.probes() {
+        idle::probes(setup, probes)?;
+    }
     let steady = !matches!(model.problem, Problem::Transient(_));
     if steady && held.iter().all(Option::is_none) {
         return Err(Error::setting(

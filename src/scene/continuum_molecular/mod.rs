@@ -110,6 +110,17 @@ impl Problem {
         }
     }
 
+    /// Two positions whose potentials or temperatures are compared.
+    pub fn probes(&self) -> Option<[[f64; 2]; 2]> {
+        match self {
+            Problem::Steady(steady) => steady.probes,
+            Problem::Static { conduction, .. } | Problem::Fracture { conduction, .. } => {
+                conduction.as_ref()?.probes
+            }
+            _ => None,
+        }
+    }
+
     pub fn conduction(&self) -> Option<&Conduction> {
         match self {
             Problem::Static { conduction, .. } | Problem::Fracture { conduction, .. } => {

@@ -9,6 +9,7 @@ use crate::physics::continuum_molecular::conductivity::{Conductivity, calibratio
 use crate::physics::continuum_molecular::cosine::CosineLaw;
 use crate::physics::continuum_molecular::elastic_law::ElasticLaw;
 use crate::physics::continuum_molecular::tensor::PlaneTensor;
+use crate::physics::continuum_molecular::thermal::ThermalStrain;
 use crate::scene::setting::Setting;
 
 /// An elastic body and what is held of it at time 1 or at the end.
@@ -18,15 +19,7 @@ pub struct Solid<const D: usize> {
     /// Of each bond of the stencil.
     pub moduli: Vec<Moduli>,
     pub held: Vec<Option<f64>>,
-    pub thermal: Option<Warm>,
-}
-
-/// What warms a body.
-pub struct Warm {
-    /// a11, a22, a12 per degree.
-    pub expansion: [f64; 3],
-    /// Temperature rise of each point.
-    pub rise: Vec<f64>,
+    pub thermal: Option<ThermalStrain>,
 }
 
 pub const DISPLACEMENT: [&[&str]; 3] = [&["x"], &["y"], &["rotation"]];
@@ -82,7 +75,7 @@ impl<const D: usize> Solid<D> {
                 Problem::Static {
                     thermal: Some(thermal),
                     ..
-                } => thermal.rise.map(|rise| Warm {
+                } => thermal.rise.map(|rise| ThermalStrain {
                     expansion: thermal.expansion,
                     rise: setup
                         .points
@@ -96,26 +89,13 @@ impl<const D: usize> Solid<D> {
         })
     }
 
-    /// Stretch and shear that bond `b` from `p` to `q` would have if it were free: the thermal strain of the mean
-    /// temperature of its ends.
-    pub fn free_strain(&self, p: usize, q: usize, b: &Bond) -> [f64; 2] {
-        let Some(thermal) = &self.thermal else {
-            return [0.0; 2];
-        };
-        let [a11, a22, a12] = thermal.expansion;
-        let [x, y] = b.n;
-        let mean = 0.5 * (thermal.rise[p] + thermal.rise[q]);
-        [
-            mean * (a11 * x * x + a22 * y * y + 2.0 * a12 * x * y),
-            mean * (a12 * (x * x - y * y) + (a22 - a11) * x * y),
-        ]
-    }
-
     /// What bond `b` from `p` to `q` carries: its deformation less the thermal one, s - αT (eq. 176).
     pub fn strained(&self, x: &[[f64; D]], p: usize, q: usize, b: &Bond) -> Deformation {
         let mut d = b.deformation(&x[p], &x[q]);
-        let [stretch, shear] = self.free_strain(p, q, b);
-        (d.stretch, d.shear) = (d.stretch - stretch, d.shear - shear);
+        if let Some(thermal) = &self.thermal {
+            let [stretch, shear] = thermal.of(p, q, b);
+            (d.stretch, d.shear) = (d.stretch - stretch, d.shear - shear);
+        }
         d
     }
 }

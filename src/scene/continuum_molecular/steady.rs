@@ -14,28 +14,6 @@ use crate::scene::setting::Setting;
 use difference::{DIFFERENCE, Difference, at_points, difference};
 use section::sections;
 
-/// Forces of thermal strain: each bond pushes with its stiffness times the stretch (and shear) that it would have if
-/// free (eq. 176).
-pub fn thermal_force<const D: usize>(solid: &Solid<D>, setup: &Setup) -> Vec<[f64; D]> {
-    let row = |p: usize| {
-        let mut force = [0.0; D];
-        for (q, kind, factor) in solid.body.row(p) {
-            let (b, k) = (&setup.bonds[kind], &solid.moduli[kind]);
-            let [x, y] = b.n;
-            let [stretch, shear] = solid.free_strain(p, q, b);
-            let weight = factor * b.volume_mm2 * setup.cell;
-            let (axial, lateral) = (weight * k.axial * stretch, weight * k.shear * shear);
-            force[0] -= axial * x - lateral * y;
-            force[1] -= axial * y + lateral * x;
-            if let Some(moment) = force.get_mut(2) {
-                *moment -= 0.5 * lateral * b.length_mm;
-            }
-        }
-        force
-    };
-    (0..setup.points.len()).map(row).collect()
-}
-
 /// Nodal forces of `load`: totals spread evenly over their regions, per unit thickness.
 pub fn loads<const D: usize>(
     scene: &Setting,
@@ -86,8 +64,9 @@ pub fn deform<const D: usize>(
     let t = scene.time.as_ref().map_or(1.0, |time| time.end);
     let heat = coupled::warm(scene, model, setup, &mut solid, conductor.as_ref())?;
     let mut force = loads(scene, model, setup, names, t)?;
-    if solid.thermal.is_some() {
-        for (f, extra) in force.iter_mut().zip(thermal_force(&solid, setup)) {
+    if let Some(thermal) = &solid.thermal {
+        let pushed = thermal.forces(&solid.body, &setup.bonds, &solid.moduli, setup.cell);
+        for (f, extra) in force.iter_mut().zip(pushed) {
             f.iter_mut().zip(extra).for_each(|(f, e)| *f += e);
         }
     }

@@ -265,13 +265,17 @@ impl Body {
             (0..self.points.len()).any(|p| self.map.unknown(first + 2 * p + axis).is_none())
         };
         let missing = [0, 1].iter().find(|&&axis| !held(axis));
-        let count = (0..2 * first)
-            .filter(|v| self.map.unknown(first + v).is_none())
-            .count();
+        // Along x a turn moves points by their y, and the other way round.
+        let turns = |axis: usize| {
+            let held = (0..first).filter(|p| self.map.unknown(first + 2 * p + axis).is_none());
+            let mut across = held.map(|p| self.points.position(p)[1 - axis]);
+            let one = across.next();
+            across.all(|at| Some(at) == one)
+        };
         let found = match missing {
             Some(axis) => format!("nothing holds the body along {}", ["x", "y"][*axis]),
-            None if count < 3 => {
-                "the body can turn: fewer than three displacements are held".to_owned()
+            None if turns(0) && turns(1) => {
+                "the body can turn: points held along x all have one y, and points held along y one x".to_owned()
             }
             None => return Ok(()),
         };

@@ -158,30 +158,15 @@ impl Model for BondBased {
     type Step<'a> = Step<'a>;
 
     fn step<'a>(&'a self, of: Stage<'a>) -> Step<'a> {
-        Step {
-            model: self,
-            map: of.map,
-            given: of.given,
-            old: of.old,
-            dt: of.dt,
-            load: of.load,
-        }
+        of.of_bonds(self)
     }
 
     fn pattern_from(&self, map: &Reduction, first: usize) -> Sparse {
         BondBased::pattern_from(self, map, first)
     }
 
-    fn reference(&self) -> f64 {
-        self.weight.reference
-    }
-
-    fn at_points(&self, own: &[f64]) -> Vec<f64> {
-        own.to_vec()
-    }
-
-    fn own_after(&self, values: &[f64], old: &[f64], _: f64) -> Vec<f64> {
-        values[..old.len()].to_vec()
+    fn weight(&self) -> &Weight {
+        &self.weight
     }
 
     fn bonds(&self) -> usize {
@@ -189,15 +174,22 @@ impl Model for BondBased {
     }
 }
 
+/// # Errors
+/// A modulus that is not positive.
+pub(super) fn require_modulus(young: f64) -> Result<()> {
+    if young.is_finite() && young > 0.0 {
+        return Ok(());
+    }
+    Err(Error::setting(
+        "physics.bond-based.young",
+        format!("found {young}"),
+        "give a positive modulus",
+    ))
+}
+
 impl Micromodulus {
     fn value(self, young: f64, stencil: &Stencil) -> Result<f64> {
-        if !(young.is_finite() && young > 0.0) {
-            return Err(Error::setting(
-                "physics.bond-based.young",
-                format!("found {young}"),
-                "give a positive modulus",
-            ));
-        }
+        require_modulus(young)?;
         if let Micromodulus::Finite(e) = self
             && !(e.is_finite() && e > 0.0)
         {

@@ -118,8 +118,8 @@ impl Model for Local {
         self.continuum.pattern_from(map, first)
     }
 
-    fn reference(&self) -> f64 {
-        self.continuum.weight.reference
+    fn weight(&self) -> &Weight {
+        &self.continuum.weight
     }
 
     /// Of Gauss densities, the mean of the nearest in each element around.

@@ -151,11 +151,18 @@ impl DensityParams {
                 ));
             }
         }
-        if !(0.0..1.0).contains(&self.noise) || !self.exponent.is_finite() {
+        if !(0.0..1.0).contains(&self.noise) {
             return Err(Error::setting(
                 "density.noise",
-                format!("found noise {} and exponent {}", self.noise, self.exponent),
+                format!("found {}", self.noise),
                 "noise is relative, from 0 to below 1: a density must stay positive",
+            ));
+        }
+        if !self.exponent.is_finite() {
+            return Err(Error::setting(
+                "density.exponent",
+                format!("found {}", self.exponent),
+                "give a finite number",
             ));
         }
         Ok(())

@@ -26,11 +26,18 @@ impl Loads {
                 let points = chosen.iter();
                 points.map(move |&p| body.placement_in(case, p, axis))
             });
-            Ok((
-                load.value.clone(),
-                1.0 / chosen.len() as f64,
-                values.collect(),
-            ))
+            let values: Vec<usize> = values.collect();
+            if values.iter().all(|&v| body.map.unknown(v).is_none()) {
+                return Err(Error::setting(
+                    format!("load[{k}].region"),
+                    format!(
+                        "all its points are held along {}: the support takes the force, and the body never sees it",
+                        load.component
+                    ),
+                    "load other points, or leave the load or the hold out",
+                ));
+            }
+            Ok((load.value.clone(), 1.0 / chosen.len() as f64, values))
         };
         Ok(Loads(
             scene

@@ -4,6 +4,8 @@ use crate::error::Result;
 use crate::operator::nonlinear::Staggered;
 use crate::operator::reduction::Reduction;
 use crate::operator::sparse::Sparse;
+use crate::physics::bond_based::Step;
+use crate::physics::growth::Weight;
 use crate::scene::frame::{Frame, Summary};
 use crate::scene::remodelling::body::{Body, NUDGE, nudge, rate_of};
 use crate::scene::remodelling::density::Probes;
@@ -24,14 +26,18 @@ pub trait Model {
     /// Entries of `∂R/∂q` among the unknowns from `first` on, numbered from there.
     fn pattern_from(&self, map: &Reduction, first: usize) -> Sparse;
 
-    /// The density of bone without change.
-    fn reference(&self) -> f64;
+    /// How energy depends on density.
+    fn weight(&self) -> &Weight;
 
-    /// Densities at the material points, where `own` are the model's.
-    fn at_points(&self, own: &[f64]) -> Vec<f64>;
+    /// Densities at the material points, where `own` are the model's. By default they are those.
+    fn at_points(&self, own: &[f64]) -> Vec<f64> {
+        own.to_vec()
+    }
 
-    /// The model's own densities after a step of `dt` from `old` to `values`.
-    fn own_after(&self, values: &[f64], old: &[f64], dt: f64) -> Vec<f64>;
+    /// The model's own densities after a step of `dt` from `old` to `values`. By default they come first among the values.
+    fn own_after(&self, values: &[f64], old: &[f64], _dt: f64) -> Vec<f64> {
+        values[..old.len()].to_vec()
+    }
 
     /// Bonds, each counted once.
     fn bonds(&self) -> usize {
@@ -48,6 +54,20 @@ pub struct Stage<'a> {
     pub dt: f64,
     /// Force on each value; empty: none.
     pub load: &'a [f64],
+}
+
+impl<'a> Stage<'a> {
+    /// The equations of a model of bonds.
+    pub fn of_bonds<M>(self, model: &'a M) -> Step<'a, M> {
+        Step {
+            model,
+            map: self.map,
+            given: self.given,
+            old: self.old,
+            dt: self.dt,
+            load: self.load,
+        }
+    }
 }
 
 /// A body and its state.
@@ -179,7 +199,7 @@ impl<M: Model> Marcher<M> {
 
     /// Relative densities, as far as they change.
     pub fn densities(&self) -> Vec<f64> {
-        let reference = self.model.reference();
+        let reference = self.model.weight().reference;
         let relative = |rho: f64| (rho - reference) / reference;
         let densities = self.model.at_points(&self.own);
         densities.into_iter().map(relative).collect()

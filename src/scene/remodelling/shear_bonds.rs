@@ -5,8 +5,11 @@ use crate::error::{Error, Result};
 use crate::operator::reduction::Reduction;
 use crate::operator::sparse::Sparse;
 use crate::physics::bond_based::shear::{Micromoduli, ShearBonds, ShearStep};
+use crate::physics::growth::Weight;
 use crate::scene::remodelling::body::Motion;
-use crate::scene::remodelling::bond_based::{BondBasedParams, CENTRAL, Case, Micromodulus, Start};
+use crate::scene::remodelling::bond_based::{
+    BondBasedParams, CENTRAL, Case, Micromodulus, Start, require_modulus,
+};
 use crate::scene::remodelling::marcher::{Marcher, Model, Stage};
 use crate::scene::setting::{Inputs, Setting};
 
@@ -27,20 +30,13 @@ impl BondBasedParams {
 
     fn micromoduli(&self, stencil: &Stencil) -> Result<Micromoduli> {
         let key = |name: &str| format!("physics.bond-based.{name}");
-        if !(self.young.is_finite() && self.young > 0.0) {
-            let found = format!("found {}", self.young);
-            return Err(Error::setting(
-                key("young"),
-                found,
-                "give a positive modulus",
-            ));
-        }
+        require_modulus(self.young)?;
         if !(-0.99..=CENTRAL + NEAR).contains(&self.poisson) {
             return Err(Error::setting(
                 key("poisson"),
                 format!("found {}", self.poisson),
                 "give a Poisson's ratio from -0.99 to 1/3 (plane stress): above 1/3 bonds would have to push where they are sheared, and \
-                 the body is not stable; [physics.continuum] takes any",
+                 the body is not stable; [physics.continuum] takes -0.99 to 0.99",
             ));
         }
         match self.micromodulus {
@@ -135,30 +131,15 @@ impl Model for ShearBonds {
     type Step<'a> = ShearStep<'a>;
 
     fn step<'a>(&'a self, of: Stage<'a>) -> ShearStep<'a> {
-        ShearStep {
-            model: self,
-            map: of.map,
-            given: of.given,
-            old: of.old,
-            dt: of.dt,
-            load: of.load,
-        }
+        of.of_bonds(self)
     }
 
     fn pattern_from(&self, map: &Reduction, first: usize) -> Sparse {
         ShearBonds::pattern_from(self, map, first)
     }
 
-    fn reference(&self) -> f64 {
-        self.weight.reference
-    }
-
-    fn at_points(&self, own: &[f64]) -> Vec<f64> {
-        own.to_vec()
-    }
-
-    fn own_after(&self, values: &[f64], old: &[f64], _: f64) -> Vec<f64> {
-        values[..old.len()].to_vec()
+    fn weight(&self) -> &Weight {
+        &self.weight
     }
 
     fn bonds(&self) -> usize {

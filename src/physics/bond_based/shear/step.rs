@@ -1,29 +1,15 @@
 //! Owns the equations of one time step of bonds that resist shear: balance of mass of all cases, equilibrium of each.
 
 use super::{Place, ShearBonds};
-use crate::operator::nonlinear::{Nonlinear, Staggered};
-use crate::operator::reduction::Reduction;
+use crate::operator::nonlinear::{Nonlinear, Staggered, positive_share};
 use crate::operator::sparse::Sparse;
+use crate::physics::bond_based::Step;
 use crate::physics::growth::{Balance, Growth};
 
-/// One time step's equations, as [`crate::physics::bond_based::Step`].
-pub struct ShearStep<'a> {
-    pub model: &'a ShearBonds,
-    pub map: &'a Reduction,
-    pub given: &'a [f64],
-    pub old: &'a [f64],
-    pub dt: f64,
-    /// Force on each value; empty: none.
-    pub load: &'a [f64],
-}
+/// One time step's equations.
+pub type ShearStep<'a> = Step<'a, ShearBonds>;
 
 impl ShearStep<'_> {
-    fn expand(&self, q: &[f64]) -> Vec<f64> {
-        let mut values = vec![0.0; self.map.values()];
-        self.map.expand(q, self.given, &mut values);
-        values
-    }
-
     /// Balance of mass at point `a`, whose energy in each case is `energy`.
     fn balance(
         &self,
@@ -35,18 +21,6 @@ impl ShearStep<'_> {
         let cases = self.model.cases.iter().enumerate();
         let stimulus = cases.map(|(case, weight)| weight * energy(case)).sum();
         growth.balance(values[a], self.old[a], stimulus, self.dt)
-    }
-
-    fn load_at(&self, value: usize, a: usize) -> f64 {
-        let share = self.model.shares.as_ref().map_or(1.0, |s| s[a]);
-        let cell = share * self.model.family.stencil.spacing.powi(2);
-        self.load.get(value).map_or(0.0, |f| f / cell)
-    }
-
-    fn put(&self, value: usize, by: f64, add: &mut impl FnMut(usize, f64)) {
-        if let Some(column) = self.map.unknown(value) {
-            add(column, by);
-        }
     }
 
     fn density_row(&self, values: &[f64], row: usize, a: usize, add: &mut impl FnMut(usize, f64)) {
@@ -150,14 +124,13 @@ impl Nonlinear for ShearStep<'_> {
 
     /// No density may lose more than 70 % at once.
     fn share(&self, q: &[f64], dq: &[f64]) -> f64 {
-        let worst = (0..self.local()).map(|k| -dq[k] / q[k]).fold(0.0, f64::max);
-        (0.7 / worst.max(1e-300)).min(1.0)
+        positive_share(self.local(), q, dq)
     }
 }
 
 impl Staggered for ShearStep<'_> {
     fn local(&self) -> usize {
-        self.map.unknowns_before(self.model.points)
+        self.densities()
     }
 
     fn local_diagonal(&self, q: &[f64], diagonal: &mut [f64]) {

@@ -68,13 +68,7 @@ impl<const D: usize> CrackGrowth<'_, D> {
         let mut numbers = self.numbers();
         let mut fields = Vec::new();
         let due = accepted && (last || self.scene.output.due(self.recorded, self.lambda));
-        let probes = match &self.model.problem {
-            Problem::Fracture {
-                conduction: Some(steady),
-                ..
-            } => steady.probes,
-            _ => None,
-        };
+        let probes = self.model.problem.probes();
         if accepted && self.piezoresistance().is_some() {
             self.update_whole_body();
         }

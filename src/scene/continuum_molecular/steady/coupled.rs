@@ -4,10 +4,11 @@
 use crate::error::{Error, Result};
 use crate::physics::continuum_molecular::body::Body;
 use crate::physics::continuum_molecular::piezoresistance::Piezoresistance;
+use crate::physics::continuum_molecular::thermal::ThermalStrain;
 use crate::scene::continuum_molecular::equilibrium::solve;
 use crate::scene::continuum_molecular::path::{CONDUCTED, STEADY, drop};
 use crate::scene::continuum_molecular::setup::{Conductor, Setup};
-use crate::scene::continuum_molecular::solid::{Solid, Warm};
+use crate::scene::continuum_molecular::solid::Solid;
 use crate::scene::continuum_molecular::steady::{loads, scalar};
 use crate::scene::continuum_molecular::{Molecular, Problem, Steady};
 use crate::scene::frame::Field;
@@ -42,7 +43,7 @@ pub fn warm<const D: usize>(
     };
     let (values, unknowns) = conducted(scene, model, setup, body)?;
     let reference = thermal.reference.unwrap_or(0.0);
-    solid.thermal = Some(Warm {
+    solid.thermal = Some(ThermalStrain {
         expansion: thermal.expansion,
         rise: values.iter().map(|t| t - reference).collect(),
     });

@@ -59,13 +59,18 @@ pub enum DensityAt {
 impl ContinuumParams {
     /// The energy of a strain at the reference density.
     pub fn law(&self, scene: &Setting) -> Result<Energy> {
-        let usable =
-            self.young > 0.0 && self.young.is_finite() && (-0.99..=0.99).contains(&self.poisson);
-        if !usable {
+        if !(self.young.is_finite() && self.young > 0.0) {
             return Err(Error::setting(
                 "physics.continuum.young",
-                format!("found young = {}, poisson = {}", self.young, self.poisson),
-                "give a positive modulus and a plane-stress Poisson's ratio between -0.99 and 0.99",
+                format!("found {}", self.young),
+                "give a positive modulus",
+            ));
+        }
+        if !(-0.99..=0.99).contains(&self.poisson) {
+            return Err(Error::setting(
+                "physics.continuum.poisson",
+                format!("found {}", self.poisson),
+                "give a plane-stress Poisson's ratio from -0.99 to 0.99",
             ));
         }
         let is_of_bonds = matches!(

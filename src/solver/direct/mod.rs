@@ -81,23 +81,6 @@ impl DirectLlt {
         })
     }
 
-    /// In the order of its rows.
-    pub fn as_numbered(a: &Sparse) -> Result<Self> {
-        let symbolic = factorize_symbolic_cholesky(
-            pattern(a),
-            Side::Upper,
-            SymmetricOrdering::Identity,
-            CholeskySymbolicParams::default(),
-        )
-        .map_err(|e| failed("Cholesky", format!("{e:?}")))?;
-        let scratch = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
-        Ok(DirectLlt {
-            symbolic,
-            numeric: Vec::new(),
-            solve_scratch: MemBuffer::new(scratch),
-        })
-    }
-
     /// Refuses a matrix that is not positive definite.
     pub fn factorize(&mut self, a: &Sparse) -> Result<()> {
         numeric_cholesky(&self.symbolic, a, &a.value, &mut self.numeric)

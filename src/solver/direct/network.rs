@@ -42,7 +42,8 @@ impl NetworkFactor {
 }
 
 fn factorised(a: &Sparse) -> Result<DirectLlt> {
-    let mut llt = DirectLlt::as_numbered(a)?;
+    let as_numbered: Vec<usize> = (0..a.n()).collect();
+    let mut llt = DirectLlt::new(a, &as_numbered)?;
     llt.factorize(a)?;
     Ok(llt)
 }

@@ -105,7 +105,7 @@ def figures(rows):
         axis.set_xlabel("material angle (degrees)")
     for axis in axes[:, 0]:
         axis.set_ylabel("discrete over local energy - 1 (%)")
-    axes[0, 1].legend(fontsize=7)
+    axes[0, 0].legend(fontsize=7, loc="lower left", ncols=2)
     plt.tight_layout()
     plt.savefig(HERE / "energy-over-m.png", dpi=110)
     plt.close()
@@ -124,6 +124,8 @@ def figures(rows):
         axis.set_title(title, fontsize=9)
         axis.set_xlabel(label)
     axes[0].set_xscale("log")
+    axes[0].set_xticks([12.5, 25, 50, 100], ["12.5", "25", "50", "100"])
+    axes[0].minorticks_off()
     axes[0].set_ylabel("frequency over that of the blocks - 1 (%)")
     axes[2].legend(fontsize=6)
     plt.tight_layout()

@@ -150,7 +150,7 @@ def figure(found):
     axes[1].set_xscale("log")
     for axis in axes:
         axis.set_ylim(bottom=0)
-    axes[0].legend(fontsize=7)
+    axes[1].legend(*axes[0].get_legend_handles_labels(), fontsize=6, loc="upper right")
     plt.tight_layout()
     plt.savefig(FIGURE, dpi=110)
 

@@ -151,6 +151,7 @@ def figure(found):
     for axis in axes:
         axis.set_ylim(bottom=0)
     axes[1].legend(*axes[0].get_legend_handles_labels(), fontsize=6, loc="upper right")
+    axes[1].set_ylim(top=28)
     plt.tight_layout()
     plt.savefig(FIGURE, dpi=110)
 

@@ -21,12 +21,14 @@ plt.rcParams.update({"font.size": 9, "axes.grid": True, "grid.color": "#cccccc"}
 def change(name):
     """Times and mean relative change of density of a run."""
     rows = list(csv.DictReader(open(RUNS / name / "history.csv")))
-    key = next(k for k in rows[0] if "density" in k or "change" in k)
-    return [float(r["t"]) for r in rows], [float(r[key]) for r in rows]
+    return [float(r["t"]) for r in rows], [float(r["mean"]) for r in rows]
 
 
 def panel(axis, title, runs):
     for k, (label, name) in enumerate(runs):
+        if not (RUNS / name / "scene.json").exists():
+            print(f"left out: {name} is missing or not finished")
+            continue
         t, v = change(name)
         late = [(a, b) for a, b in zip(t, v) if a >= 6.99]
         axis.plot([a for a, _ in late], [b for _, b in late], linestyle=DASHES[k], color=HUES[k], lw=1.2, label=label)
@@ -34,7 +36,7 @@ def panel(axis, title, runs):
     axis.set_xlim(7, 8)
     axis.set_xlabel("time t")
     axis.set_ylabel("mean relative change of density")
-    axis.legend(fontsize=7)
+    axis.legend(fontsize=7, loc="center right")
 
 
 figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.6))

@@ -15,6 +15,7 @@ pub fn figures(samples: &[Sample]) -> Vec<Figure> {
     }
     let pairs = against_reference(samples);
     let mut figures = vec![methods(samples)];
+    figures.extend(bone_volumes(samples));
     figures.extend(identity(&pairs));
     figures.extend(identity_over_bv_tv(&pairs));
     figures.extend(differences(&pairs));
@@ -45,10 +46,28 @@ fn methods(samples: &[Sample]) -> Figure {
     }
 }
 
+/// Bone volume of the models over that of the mask. None where no model has one.
+fn bone_volumes(samples: &[Sample]) -> Option<Figure> {
+    let places = samples.iter().map(|s| (s, s.bone_volumes()));
+    let places: Vec<_> = places.filter(|(_, [mask, _])| !mask.is_empty()).collect();
+    (!places.is_empty()).then(|| Figure {
+        stem: "bone-volume".to_owned(),
+        folded: true,
+        title: "Bone volume of the models".to_owned(),
+        caption: "BV/TV of the cells or elements that carry load over that of the mask, one point per scan, with lines of least squares; on the dashed black line both are equal."
+            .to_owned(),
+        x: Axis::linear("BV/TV of the mask"),
+        y: Axis::linear("BV/TV of the model"),
+        content: Content::Curves(against_equal(&places)),
+        ..Figure::default()
+    })
+}
+
 /// Moduli of all methods over those of the reference. None without comparisons.
 fn identity(pairs: &[Comparison]) -> Option<Figure> {
     let reference = &pairs.first()?.reference.method;
-    let curves = against_equal(pairs, |c| [c.reference_mpa.clone(), c.method_mpa.clone()]);
+    let places = |c: &Comparison| [c.reference_mpa.clone(), c.method_mpa.clone()];
+    let curves = against_equal(&each_sample(pairs, places));
     Some(Figure {
         stem: "agreement".to_owned(),
         folded: true,
@@ -64,10 +83,11 @@ fn identity(pairs: &[Comparison]) -> Option<Figure> {
 /// The same of moduli over BV/TV: what the amount of bone explains is out.
 fn identity_over_bv_tv(pairs: &[Comparison]) -> Option<Figure> {
     let reference = &pairs.first()?.reference.method;
-    let curves = against_equal(pairs, |c| {
+    let places = |c: &Comparison| {
         let [method, reference] = c.over_bv_tv();
         [reference, method]
-    });
+    };
+    let curves = against_equal(&each_sample(pairs, places));
     Some(Figure {
         stem: "agreement-over-bv-tv".to_owned(),
         folded: true,
@@ -81,21 +101,27 @@ fn identity_over_bv_tv(pairs: &[Comparison]) -> Option<Figure> {
     })
 }
 
-/// Points and lines of fit of all comparisons, `values` over x and y, and the line on which methods agree.
-fn against_equal(
-    pairs: &[Comparison],
-    values: impl Fn(&Comparison) -> [Vec<f64>; 2],
-) -> Vec<Curve> {
-    let places: Vec<[Vec<f64>; 2]> = pairs.iter().map(values).collect();
+/// The methods compared, and the places of their points.
+fn each_sample<'a>(
+    pairs: &[Comparison<'a>],
+    places: impl Fn(&Comparison) -> [Vec<f64>; 2],
+) -> Vec<(&'a Sample, [Vec<f64>; 2])> {
+    pairs.iter().map(|c| (c.sample, places(c))).collect()
+}
+
+/// Points and lines of fit of methods, values over x and y, and the line on which both are equal.
+fn against_equal(places: &[(&Sample, [Vec<f64>; 2])]) -> Vec<Curve> {
     let most = places
         .iter()
-        .flat_map(|[x, _]| x)
+        .flat_map(|(_, [x, _])| x)
         .copied()
         .fold(0.0, f64::max);
-    let both = pairs.iter().zip(&places);
-    let numbered = both.clone().enumerate();
-    let mut curves: Vec<Curve> = numbered.map(|(i, (c, at))| points(i, c, at)).collect();
-    curves.extend(both.filter_map(|(c, at)| fitted(c.sample.model as usize, at)));
+    let numbered = places.iter().enumerate();
+    let mut curves: Vec<Curve> = numbered.map(|(i, (s, at))| points(i, s, at)).collect();
+    let lines = places
+        .iter()
+        .filter_map(|(s, at)| fitted(s.model as usize, at));
+    curves.extend(lines);
     curves.push(Curve {
         name: "equal".to_owned(),
         hue: 2,
@@ -106,11 +132,11 @@ fn against_equal(
     curves
 }
 
-/// Methods of one model on several structures have one colour; each comparison has its own marker.
-fn points(number: usize, c: &Comparison, [x, y]: &[Vec<f64>; 2]) -> Curve {
+/// Methods of one model on several structures have one colour; each has its own marker.
+fn points(number: usize, sample: &Sample, [x, y]: &[Vec<f64>; 2]) -> Curve {
     Curve {
-        name: c.sample.method.clone(),
-        hue: c.sample.model as usize,
+        name: sample.method.clone(),
+        hue: sample.model as usize,
         shape: number,
         mark: Mark::Points,
         points: x.iter().zip(y).map(|(x, y)| Point::new(*x, *y)).collect(),
@@ -165,7 +191,9 @@ fn differences_over_bv_tv(pairs: &[Comparison]) -> Option<Figure> {
     let first = pairs.first()?;
     let places = |c: &Comparison| [c.bv_tv.clone(), c.differences_percent()];
     let numbered = pairs.iter().enumerate();
-    let mut curves: Vec<Curve> = numbered.map(|(i, c)| points(i, c, &places(c))).collect();
+    let mut curves: Vec<Curve> = numbered
+        .map(|(i, c)| points(i, c.sample, &places(c)))
+        .collect();
     let lines = pairs
         .iter()
         .filter_map(|c| fitted(c.sample.model as usize, &places(c)));

@@ -14,6 +14,8 @@ pub(super) struct Case {
     pub scan: String,
     pub group: Option<String>,
     pub bv_tv: f64,
+    /// Of the cells or elements that carry load; None for means and limits, which have none.
+    pub model_bv_tv: Option<f64>,
     pub e_app_mpa: f64,
     /// All that is stated of the error, over the modulus.
     pub stated: Option<f64>,
@@ -35,6 +37,13 @@ impl Sample {
 
     pub(super) fn e_app_mpa(&self) -> Vec<f64> {
         self.cases.iter().map(|case| case.e_app_mpa).collect()
+    }
+
+    /// BV/TV of the mask and of the model, of the scans whose model has one.
+    pub(super) fn bone_volumes(&self) -> [Vec<f64>; 2] {
+        let both = |case: &Case| Some((case.bv_tv, case.model_bv_tv?));
+        let (mask, model) = self.cases.iter().filter_map(both).unzip();
+        [mask, model]
     }
 
     /// Mean over scans; infinite where one of them states none.
@@ -158,6 +167,7 @@ fn case(row: &Row) -> Option<Case> {
         scan: row.key.scan.clone(),
         group: row.marks.group.clone(),
         bv_tv: row.key.bv_tv,
+        model_bv_tv: row.solved.as_ref().and_then(|s| s.model_bv_tv),
         e_app_mpa,
         stated: stated.filter(|s| s.is_finite()),
     })

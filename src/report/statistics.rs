@@ -30,7 +30,7 @@ pub struct AgreementLine {
 /// One line of a table of distributions.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct BoxLine {
-    /// `E_app (MPa)`, `E_app / (BV/TV) (MPa)` or `difference from REFERENCE (%)`.
+    /// `E_app (MPa)`, `E_app / (BV/TV) (MPa)`, `BV of the model, difference from the mask (%)` or `difference from REFERENCE (%)`.
     pub quantity: String,
     pub method: String,
     /// None: all scans.
@@ -162,6 +162,14 @@ pub fn statistics(samples: &[Sample]) -> Statistics {
             fit: regression(&bv_tv, &s.e_app_mpa())?,
         })
     });
+    let of_bone = samples.iter().filter_map(|s| {
+        let [mask, model] = s.bone_volumes();
+        Some(RegressionLine {
+            y: format!("BV/TV of the model, {}", s.method),
+            x: "BV/TV".to_owned(),
+            fit: regression(&mask, &model)?,
+        })
+    });
     let pairs = against_reference(samples);
     let on_reference = pairs.iter().filter_map(|c| {
         Some(RegressionLine {
@@ -194,7 +202,8 @@ pub fn statistics(samples: &[Sample]) -> Statistics {
     });
     let (anova_between, values) = repeated(samples);
     Statistics {
-        regressions: on_bv_tv
+        regressions: of_bone
+            .chain(on_bv_tv)
             .chain(on_reference)
             .chain(over_bv_tv)
             .chain(differences)
@@ -242,7 +251,11 @@ fn box_lines(sample: &Sample) -> Vec<BoxLine> {
             found: quartiles(values)?,
         })
     };
+    let [mask, model] = sample.bone_volumes();
+    let both = model.iter().zip(&mask);
+    let off: Vec<f64> = both.map(|(m, b)| 100.0 * (m / b - 1.0)).collect();
     let mut lines = vec![
+        line("BV of the model, difference from the mask (%)", None, &off),
         line("E_app (MPa)", None, &sample.e_app_mpa()),
         line("E_app / (BV/TV) (MPa)", None, &over),
     ];

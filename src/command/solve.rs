@@ -24,7 +24,7 @@ use crate::pipeline::apparent::discretisation::yielded::Kept;
 use crate::pipeline::apparent::fields::Recorded;
 use crate::pipeline::apparent::job::{Job, JobResult};
 use crate::pipeline::apparent::tissue::Tissue;
-use crate::pipeline::apparent::{Load, SolveParams, jobs, settled};
+use crate::pipeline::apparent::{Load, Method, SolveParams, jobs, of_voxels, settled};
 use crate::pipeline::lattice::LatticeParams;
 use crate::record::details;
 use crate::record::results::{self, Results};
@@ -64,6 +64,8 @@ pub struct OpenScan {
     in_memory: InMemory,
     /// Energy densities of the loads solved since they were asked for, which are not written then.
     unit_fields: Option<Vec<UnitField>>,
+    /// Of solves that differ in their loads: the job of the one before, with its model.
+    family: Option<Option<Job>>,
 }
 
 /// What solves of a scan in memory leave in addition to their rows, in the order of the solves.
@@ -155,7 +157,23 @@ impl OpenScan {
             specimen,
             in_memory: InMemory::default(),
             unit_fields: None,
+            family: None,
         })
+    }
+
+    /// Whether elements and multigrid are kept from solve to solve, where the next has other loads on the same elements.
+    pub(crate) fn keep_models(&mut self, keep: bool) {
+        self.family = keep.then_some(None);
+    }
+
+    /// The solves that the settings name. Elements are kept in a family of loads; lattices, of which there are several, are not.
+    fn jobs(&mut self, lattices: &LatticeParams, params: &SolveParams) -> Vec<Job> {
+        match &mut self.family {
+            Some(before) if params.method == Method::VoxelFe => {
+                vec![before.take().unwrap_or_else(|| of_voxels().of_a_family())]
+            }
+            _ => jobs(lattices, params),
+        }
     }
 
     /// Keeps the energy densities of the solves to come in memory, in place of files.
@@ -229,7 +247,8 @@ impl OpenScan {
         lattices.check()?;
         params.check()?;
         let params = &*settled(&self.specimen, params)?;
-        let jobs: Vec<(Job, Row)> = jobs(lattices, params)
+        let jobs: Vec<(Job, Row)> = self
+            .jobs(lattices, params)
             .into_iter()
             .map(|job| {
                 let row = self.blank(&job, params);
@@ -294,6 +313,11 @@ impl OpenScan {
                 }
             }
             rows.push(row);
+        }
+        if let Some(before) = &mut self.family
+            && params.method == Method::VoxelFe
+        {
+            *before = jobs.into_iter().next().map(|(job, _)| job);
         }
         let known = self.results.solved();
         let all = with_derived(&rows, &known);

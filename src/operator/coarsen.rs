@@ -3,6 +3,7 @@
 use super::{MixedPrecision, Operator};
 use crate::par::{CHUNK, each_chunk};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The coupling of two sites: `block[a][b]` is the force on component `a` of the row's site per unit displacement of
 /// component `b` of the column's site.
@@ -61,47 +62,54 @@ pub trait Coarsen: Operator<3> {
     fn eigenvalue_bound(&self) -> f64;
 }
 
-impl<O: Coarsen> Coarsen for &O {
-    fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
-        (**self).positions(sites, x);
-    }
+/// What refers to an operator can be coarsened as it.
+macro_rules! refers {
+    ($($of:ty: [$($bound:tt)*]),+) => {$(
+        impl<O: Coarsen + $($bound)*> Coarsen for $of {
+            fn positions(&self, sites: Range<usize>, x: &mut [[f64; 3]]) {
+                (**self).positions(sites, x);
+            }
 
-    fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
-        (**self).each_row(sites, visit);
-    }
+            fn each_row(&self, sites: Range<usize>, visit: &mut VisitRow<Block>) {
+                (**self).each_row(sites, visit);
+            }
 
-    fn each_diagonal(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &Block)) {
-        (**self).each_diagonal(sites, visit);
-    }
+            fn each_diagonal(&self, sites: Range<usize>, visit: &mut dyn FnMut(usize, &Block)) {
+                (**self).each_diagonal(sites, visit);
+            }
 
-    fn reach(&self, sites: Range<usize>) -> Range<usize> {
-        (**self).reach(sites)
-    }
+            fn reach(&self, sites: Range<usize>) -> Range<usize> {
+                (**self).reach(sites)
+            }
 
-    fn hinges(&self, sites: Range<usize>, hinges: &mut [bool]) {
-        (**self).hinges(sites, hinges);
-    }
+            fn hinges(&self, sites: Range<usize>, hinges: &mut [bool]) {
+                (**self).hinges(sites, hinges);
+            }
 
-    fn is_uniform(&self) -> bool {
-        (**self).is_uniform()
-    }
+            fn is_uniform(&self) -> bool {
+                (**self).is_uniform()
+            }
 
-    fn chunk(&self) -> usize {
-        (**self).chunk()
-    }
+            fn chunk(&self) -> usize {
+                (**self).chunk()
+            }
 
-    fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
-        (**self).rows_f64(sites, x, y);
-    }
+            fn rows_f64(&self, sites: Range<usize>, x: &[[f64; 3]], y: &mut [[f64; 3]]) {
+                (**self).rows_f64(sites, x, y);
+            }
 
-    fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
-        (**self).rows_f32(sites, x, y);
-    }
+            fn rows_f32(&self, sites: Range<usize>, x: &[[f32; 3]], y: &mut [[f32; 3]]) {
+                (**self).rows_f32(sites, x, y);
+            }
 
-    fn eigenvalue_bound(&self) -> f64 {
-        (**self).eigenvalue_bound()
-    }
+            fn eigenvalue_bound(&self) -> f64 {
+                (**self).eigenvalue_bound()
+            }
+        }
+    )+};
 }
+
+refers!(&O: [], Arc<O>: [Send]);
 
 /// What can be applied to any range of rows needs no more than that.
 impl<O: Coarsen> MixedPrecision for O {

@@ -11,6 +11,8 @@ pub mod probe;
 pub mod reduction;
 pub mod sparse;
 
+use std::sync::Arc;
+
 /// A symmetric positive semi-definite linear operator on `sites() × D` unknowns.
 pub trait Operator<const D: usize>: Sync {
     fn sites(&self) -> usize;
@@ -20,19 +22,26 @@ pub trait Operator<const D: usize>: Sync {
     fn diagonal(&self, d: &mut [[f64; D]]);
 }
 
-impl<const D: usize, O: Operator<D>> Operator<D> for &O {
-    fn sites(&self) -> usize {
-        (**self).sites()
-    }
+/// What refers to an operator is one.
+macro_rules! refers {
+    ($($of:ty: [$($bound:tt)*]),+) => {$(
+        impl<const D: usize, O: Operator<D> + $($bound)*> Operator<D> for $of {
+            fn sites(&self) -> usize {
+                (**self).sites()
+            }
 
-    fn apply(&self, x: &[[f64; D]], y: &mut [[f64; D]]) {
-        (**self).apply(x, y);
-    }
+            fn apply(&self, x: &[[f64; D]], y: &mut [[f64; D]]) {
+                (**self).apply(x, y);
+            }
 
-    fn diagonal(&self, d: &mut [[f64; D]]) {
-        (**self).diagonal(d);
-    }
+            fn diagonal(&self, d: &mut [[f64; D]]) {
+                (**self).diagonal(d);
+            }
+        }
+    )+};
 }
+
+refers!(&O: [], Arc<O>: [Send]);
 
 /// An approximate inverse, symmetric and positive definite on the free unknowns: `z ≈ A⁻¹ r`.
 pub trait Preconditioner<const D: usize>: Sync {
@@ -43,6 +52,12 @@ pub trait Preconditioner<const D: usize>: Sync {
 pub trait SinglePreconditioner<const D: usize>: Sync {
     /// `z ≈ A⁻¹ r`, zero in held components; `spare` is room for one vector more. Both change places at will.
     fn apply_single(&self, r: &[[f32; D]], z: &mut Vec<[f32; D]>, spare: &mut Vec<[f32; D]>);
+}
+
+impl<const D: usize, P: SinglePreconditioner<D> + Send> SinglePreconditioner<D> for Arc<P> {
+    fn apply_single(&self, r: &[[f32; D]], z: &mut Vec<[f32; D]>, spare: &mut Vec<[f32; D]>) {
+        (**self).apply_single(r, z, spare);
+    }
 }
 
 /// An operator for solvers that keep most of their vectors in single precision.

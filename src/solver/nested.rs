@@ -19,7 +19,7 @@ pub struct TwoLevel<'a, O: Nested> {
     operator: &'a O,
     inverse: Vec<[f32; 6]>,
     held: Held,
-    amg: Amg<'a, O::Coarse>,
+    amg: Amg<&'a O::Coarse>,
     largest: f32,
     /// Used by one cycle at a time.
     room: Mutex<Room>,

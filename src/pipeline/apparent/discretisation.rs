@@ -74,6 +74,17 @@ pub trait Discretisation: Sized {
     /// Settings that do not fit the specimen, loads that this discretisation cannot bear.
     fn build(case: &Self::Case, prepared: Prepared, params: &SolveParams) -> Result<Self>;
 
+    /// Keeps from now on what later loads may use.
+    fn keep(&mut self) {}
+
+    /// The same discretisation under other loads; None where the settings differ in more than loads, or nothing is gained.
+    ///
+    /// # Errors
+    /// As [`Discretisation::build`].
+    fn under(self, _prepared: Prepared, _params: &SolveParams) -> Result<Option<Self>> {
+        Ok(None)
+    }
+
     /// The equations of a set of loads that share their supports.
     fn system(
         &self,

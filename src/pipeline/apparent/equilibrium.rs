@@ -19,7 +19,7 @@ pub fn equilibrium<'a, O: MixedPrecision, C: Precondition, G: Functional<3>>(
     params: &SolveParams,
     observe: &'a mut Observe,
 ) -> impl Iterator<Item = (usize, Displacements, CgInfo)> {
-    let cg = accuracy(params);
+    let mut cg = accuracy(params);
     let multigrid = system.coarsen.precondition(&system.held, &system.multigrid);
     loads.iter().map(move |&load| {
         let mut u = (system.start)(load);
@@ -36,6 +36,7 @@ pub fn equilibrium<'a, O: MixedPrecision, C: Precondition, G: Functional<3>>(
             system.goal.as_ref(),
             |step| observe(load, step),
         );
+        cg.known_eigenvalue = info.eigenvalue;
         if let Some(labels) = system.by_label {
             labels.by.settle(labels.mesh, &mut u);
         }

@@ -21,12 +21,16 @@ use crate::result::settings::{Motion, Settings};
 use crate::solver::cg::Ended;
 use crate::volume::Specimen;
 use std::ops::Deref;
+use std::sync::Mutex;
 
 /// One solve to come.
 pub struct Job(Box<dyn Solve>);
 
 /// What a solve can be asked, whichever its discretisation.
 pub trait Solve: Send + Sync {
+    /// Keeps the model from solve to solve.
+    fn keep(&mut self);
+
     /// Fills in the settings of a row that say how the specimen is discretised.
     fn label(&self, specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings;
 
@@ -82,8 +86,14 @@ impl Deref for Job {
 
 impl Job {
     /// The solve by one discretisation.
-    pub fn of<D: Discretisation + 'static>(case: D::Case) -> Job {
-        Job(Box::new(Of::<D>(case)))
+    pub fn of<D: Discretisation + Send + 'static>(case: D::Case) -> Job {
+        Job(Box::new(Of::<D> { case, kept: None }))
+    }
+
+    /// The same job, which keeps its model from solve to solve: one specimen under several loads.
+    pub fn of_a_family(mut self) -> Job {
+        self.0.keep();
+        self
     }
 
     /// The same from the specimen alone, for a single solve.
@@ -122,23 +132,57 @@ impl JobResult {
 }
 
 /// A solve by one kind of discretisation.
-struct Of<D: Discretisation>(D::Case);
+struct Of<D: Discretisation> {
+    case: D::Case,
+    /// The model of the solve before; None where none is kept.
+    kept: Option<Mutex<Option<D>>>,
+}
 
-impl<D: Discretisation> Solve for Of<D> {
+impl<D: Discretisation> Of<D> {
+    /// The model for this load: that of the solve before where only loads differ.
+    fn model(&self, prepared: Prepared, params: &SolveParams, memory: &dyn Memory) -> Result<D> {
+        if let Some(kept) = self.take_kept() {
+            // What fitted before fits again.
+            if let Some(model) = kept.under(prepared, params)? {
+                return Ok(model);
+            }
+        }
+        let counted = fitting::<D>(&self.case, prepared, params, memory)?;
+        let mut model = match counted {
+            Some(model) => model,
+            None => D::build(&self.case, prepared, params)?,
+        };
+        if self.kept.is_some() {
+            model.keep();
+        }
+        Ok(model)
+    }
+
+    fn take_kept(&self) -> Option<D> {
+        let kept = self.kept.as_ref()?;
+        kept.lock().unwrap_or_else(|e| e.into_inner()).take()
+    }
+}
+
+impl<D: Discretisation + Send> Solve for Of<D> {
+    fn keep(&mut self) {
+        self.kept.get_or_insert_default();
+    }
+
     fn label(&self, specimen: &Specimen, params: &SolveParams, key: Settings) -> Settings {
-        D::label(&self.0, specimen, params, key)
+        D::label(&self.case, specimen, params, key)
     }
 
     fn cost(&self, params: &SolveParams, known: Known) -> Result<Cost> {
-        D::cost(&self.0, params, known)
+        D::cost(&self.case, params, known)
     }
 
     fn counted_cost(&self, prepared: Prepared, params: &SolveParams) -> Result<Cost> {
-        Ok(counted::<D>(&self.0, prepared, params)?.0)
+        Ok(counted::<D>(&self.case, prepared, params)?.0)
     }
 
     fn fits(&self, prepared: Prepared, params: &SolveParams, memory: &dyn Memory) -> Result<()> {
-        fitting::<D>(&self.0, prepared, params, memory).map(drop)
+        fitting::<D>(&self.case, prepared, params, memory).map(drop)
     }
 
     fn solve(
@@ -149,94 +193,108 @@ impl<D: Discretisation> Solve for Of<D> {
         kept: &mut dyn Kept,
         observe: &mut Observe,
     ) -> Result<JobResult> {
-        let counted = fitting::<D>(&self.0, prepared, params, memory)?;
-        let build = || counted.map_or_else(|| D::build(&self.0, prepared, params), Ok);
         if params.load == Load::Stiffness {
+            let build = || self.model(prepared, params, memory);
             let solved = stiffness(build, prepared.specimen, params, observe)?;
             return Ok(JobResult::Stiffness(solved));
         }
-        let model = build()?;
-        let system = model.system(LoadSet::Ends);
-        if system.sites == 0 {
-            let no_answer = bone_connects(prepared.specimen, params);
-            let solved = Solved::disconnected(system.dropped, no_answer);
-            return Ok(JobResult::Modulus(solved, Recorded::default()));
+        let model = self.model(prepared, params, memory)?;
+        let result = of_ends(&model, prepared, params, kept, observe)?;
+        if let Some(kept) = &self.kept {
+            *kept.lock().unwrap_or_else(|e| e.into_inner()) = Some(model);
         }
-        let mechanisms = count_mechanisms(&system)?;
-        let loads = LoadSet::Ends.numbers();
-        let (_, u, info) = equilibrium(&system, loads, params, observe)
-            .next()
-            .expect("one motion of the ends is one load");
-        let mut force = vec![[0.0; 3]; u.len()];
-        system.operator.apply(&u, &mut force);
-        let elastic = Equilibrated {
-            u: &u,
-            force: &force,
-            info: &info,
-            plastic: None,
-        };
-        let EndSites {
-            motion,
-            planes_mm,
-            each,
-        } = &system.ends;
-        let moduli = match motion.motion {
-            Motion::Along => model.assess(&elastic),
-            _ => Moduli::NONE,
-        };
-        let mut work = match system.by_label {
-            Some(labels) => labels.by.work(&info),
-            None => motion.work(&moduli, &info),
-        };
-        // A mechanism bears nothing that could yield.
-        let yielded = match (&system.load_steps, info.ended) {
-            (Some(load), Ended::EnergyTolerance | Ended::ResidualTolerance) => {
-                Some(load(prepared, &system.held, &u, kept)?)
-            }
-            _ => None,
-        };
-        let end = match &yielded {
-            None => elastic,
-            Some(y) => Equilibrated {
-                u: &y.u,
-                force: &y.force,
-                info: &info,
-                plastic: Some(&y.plastic),
-            },
-        };
-        let mut recorded = model.fields(prepared, params, &end, &work)?;
-        match system.by_label {
-            None => {
-                recorded.details.ends = reactions(motion, *planes_mm, end.force, each).to_vec();
-            }
-            Some(labels) => {
-                recorded.details.labels = labels.by.table(labels.mesh, end.u, end.force);
-                recorded.note = labels.by.note();
-            }
-        }
-        let iterations = info.iterations + yielded.as_ref().map_or(0, |y| y.iterations);
-        let yielding = yielded.map(|y| y.yielding);
-        if let Some(y) = &yielding {
-            recorded.details.curve.clone_from(&y.curve);
-            recorded.details.yielded.clone_from(&y.shares);
-            work.force_n = y.curve.last().map(|p| p.force_n.abs());
-        }
-        let solved = Solved {
-            sites: system.sites,
-            dropped: system.dropped,
-            model_bv_tv: Some(system.volume_mm3 / prepared.specimen.tv_mm3),
-            unknowns: system.held.free::<3>(),
-            iterations,
-            residual: info.residual,
-            ended: info.ended,
-            moduli,
-            work,
-            mechanisms,
-            no_answer: moduli.e_app_mpa == 0.0,
-            yielding,
-        };
-        Ok(JobResult::Modulus(solved, recorded))
+        Ok(result)
     }
+}
+
+/// Solves a model under the motion of its ends, or the loads on labels.
+fn of_ends<D: Discretisation>(
+    model: &D,
+    prepared: Prepared,
+    params: &SolveParams,
+    kept: &mut dyn Kept,
+    observe: &mut Observe,
+) -> Result<JobResult> {
+    let system = model.system(LoadSet::Ends);
+    if system.sites == 0 {
+        let no_answer = bone_connects(prepared.specimen, params);
+        let solved = Solved::disconnected(system.dropped, no_answer);
+        return Ok(JobResult::Modulus(solved, Recorded::default()));
+    }
+    let mechanisms = count_mechanisms(&system)?;
+    let loads = LoadSet::Ends.numbers();
+    let (_, u, info) = equilibrium(&system, loads, params, observe)
+        .next()
+        .expect("one motion of the ends is one load");
+    let mut force = vec![[0.0; 3]; u.len()];
+    system.operator.apply(&u, &mut force);
+    let elastic = Equilibrated {
+        u: &u,
+        force: &force,
+        info: &info,
+        plastic: None,
+    };
+    let EndSites {
+        motion,
+        planes_mm,
+        each,
+    } = &system.ends;
+    let moduli = match motion.motion {
+        Motion::Along => model.assess(&elastic),
+        _ => Moduli::NONE,
+    };
+    let mut work = match system.by_label {
+        Some(labels) => labels.by.work(&info),
+        None => motion.work(&moduli, &info),
+    };
+    // A mechanism bears nothing that could yield.
+    let yielded = match (&system.load_steps, info.ended) {
+        (Some(load), Ended::EnergyTolerance | Ended::ResidualTolerance) => {
+            Some(load(prepared, &system.held, &u, kept)?)
+        }
+        _ => None,
+    };
+    let end = match &yielded {
+        None => elastic,
+        Some(y) => Equilibrated {
+            u: &y.u,
+            force: &y.force,
+            info: &info,
+            plastic: Some(&y.plastic),
+        },
+    };
+    let mut recorded = model.fields(prepared, params, &end, &work)?;
+    match system.by_label {
+        None => {
+            recorded.details.ends = reactions(motion, *planes_mm, end.force, each).to_vec();
+        }
+        Some(labels) => {
+            recorded.details.labels = labels.by.table(labels.mesh, end.u, end.force);
+            recorded.note = labels.by.note();
+        }
+    }
+    let iterations = info.iterations + yielded.as_ref().map_or(0, |y| y.iterations);
+    let yielding = yielded.map(|y| y.yielding);
+    if let Some(y) = &yielding {
+        recorded.details.curve.clone_from(&y.curve);
+        recorded.details.yielded.clone_from(&y.shares);
+        work.force_n = y.curve.last().map(|p| p.force_n.abs());
+    }
+    let solved = Solved {
+        sites: system.sites,
+        dropped: system.dropped,
+        model_bv_tv: Some(system.volume_mm3 / prepared.specimen.tv_mm3),
+        unknowns: system.held.free::<3>(),
+        iterations,
+        residual: info.residual,
+        ended: info.ended,
+        moduli,
+        work,
+        mechanisms,
+        no_answer: moduli.e_app_mpa == 0.0,
+        yielding,
+    };
+    Ok(JobResult::Modulus(solved, recorded))
 }
 
 /// Whether voxels of bone that share nodes join the grips. A grip that no voxel plane fits joins nothing.

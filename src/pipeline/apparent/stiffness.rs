@@ -1,4 +1,4 @@
-//! Owns the apparent stiffness matrix: six unit strains, one preconditioner per set of supports.
+//! Owns the apparent stiffness matrix: six unit strains, one preconditioner per set of supports, of parts that they share.
 
 use crate::error::{Error, Result};
 use crate::measure::stiffness::Six;
@@ -111,7 +111,7 @@ impl Stiffness {
 }
 
 /// Loads that share their supports.
-fn groups(conditions: Conditions) -> &'static [&'static [usize]] {
+pub fn groups(conditions: Conditions) -> &'static [&'static [usize]] {
     match conditions {
         Conditions::Kinematic => &[&[0, 1, 2, 3, 4, 5]],
         Conditions::Mixed | Conditions::Symshear => &[&[0, 1, 2], &[3], &[4], &[5]],

@@ -10,19 +10,43 @@ use crate::operator::coarsen::{Block, Coarsen, VisitRow};
 use crate::operator::held::Held;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Sites per task of the set-up.
 const CHUNK: usize = 2048;
 
-pub struct Fine<'a, O> {
-    operator: &'a O,
+pub struct Fine<O> {
+    operator: O,
     /// Zero in held components and at padding.
     diagonal: Diagonal,
+    grouped: Arc<Grouped>,
+    /// Orthonormal motions of each aggregate from plain ones.
+    bases: Vec<[Six; 6]>,
+}
+
+/// Aggregates, and the frames that their motions are in.
+pub struct Grouped {
     aggregates: Aggregates,
     /// Each aggregate's centre and the inverse of its radius: motions are in units of the radius.
     frames: Vec<[f64; 4]>,
-    /// Orthonormal motions of each aggregate from plain ones.
-    bases: Vec<[Six; 6]>,
+}
+
+impl Grouped {
+    fn new(operator: &impl Coarsen, diagonal: &Diagonal, box_mm: [f64; 3]) -> Self {
+        let boxes = boxes(operator, diagonal, box_mm);
+        let rows = |sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32])| {
+            operator.each_row(sites, &mut |site, columns, _| visit(site, columns));
+        };
+        let hinges = hinges(operator);
+        let strong = |sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32])| {
+            each_strong(operator, diagonal, &hinges, sites, visit);
+        };
+        let (of, count) = grouping::in_boxes(boxes, &strong, &rows);
+        let aggregates = Aggregates::new(&of, count, CHUNK, operator.chunk());
+        drop((of, hinges));
+        let frames = frames(operator, &aggregates);
+        Grouped { aggregates, frames }
+    }
 }
 
 /// What the next level needs to know of an aggregate.
@@ -33,27 +57,25 @@ pub struct Body {
     pub basis: Basis,
 }
 
-impl<'a, O: Coarsen> Fine<'a, O> {
+impl<O: Coarsen> Fine<O> {
     /// `box_mm`: edges of the boxes whose connected pieces are aggregates.
-    pub fn new(operator: &'a O, held: &Held, box_mm: [f64; 3]) -> (Self, Vec<Body>) {
-        let diagonal = Diagonal::new(operator, held);
-        let boxes = boxes(operator, &diagonal, box_mm);
-        let rows = |sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32])| {
-            operator.each_row(sites, &mut |site, columns, _| visit(site, columns));
-        };
-        let hinges = hinges(operator);
-        let strong = |sites: Range<usize>, visit: &mut dyn FnMut(usize, &[u32])| {
-            each_strong(operator, &diagonal, &hinges, sites, visit);
-        };
-        let (of, count) = grouping::in_boxes(boxes, &strong, &rows);
-        let aggregates = Aggregates::new(&of, count, CHUNK, operator.chunk());
-        drop((of, hinges));
-        let frames = frames(operator, &aggregates);
+    pub fn new(operator: O, held: &Held, box_mm: [f64; 3]) -> (Self, Vec<Body>) {
+        let diagonal = Diagonal::new(&operator, held);
+        let grouped = Arc::new(Grouped::new(&operator, &diagonal, box_mm));
+        Fine::of(operator, diagonal, grouped)
+    }
+
+    /// The same aggregates with other components held.
+    pub fn regrouped(operator: O, held: &Held, grouped: &Arc<Grouped>) -> (Self, Vec<Body>) {
+        let diagonal = Diagonal::new(&operator, held);
+        Fine::of(operator, diagonal, Arc::clone(grouped))
+    }
+
+    fn of(operator: O, diagonal: Diagonal, grouped: Arc<Grouped>) -> (Self, Vec<Body>) {
         let mut fine = Fine {
             operator,
             diagonal,
-            aggregates,
-            frames,
+            grouped,
             bases: Vec::new(),
         };
         let bodies = fine.bodies();
@@ -64,9 +86,15 @@ impl<'a, O: Coarsen> Fine<'a, O> {
         (fine, bodies)
     }
 
+    /// The aggregates, for other supports.
+    pub fn grouped(&self) -> &Arc<Grouped> {
+        &self.grouped
+    }
+
     /// The aggregates as the next level sees them: their motions made orthonormal.
     fn bodies(&self) -> Vec<Body> {
-        let count = self.aggregates.count;
+        let Grouped { aggregates, frames } = &*self.grouped;
+        let count = aggregates.count;
         let mut grams: Vec<(Mat6, f64)> = vec![([[0.0; 6]; 6], 0.0); count];
         let visit = |sites: Range<usize>, sums: &mut Sums<(Mat6, f64)>| {
             self.each_modes(sites, |site, modes| {
@@ -87,14 +115,13 @@ impl<'a, O: Coarsen> Fine<'a, O> {
             both.for_each(|(s, p)| *s += p);
             sum.1 += part.1;
         };
-        self.aggregates
-            .sum(&mut grams, ([[0.0; 6]; 6], 0.0), visit, add);
+        aggregates.sum(&mut grams, ([[0.0; 6]; 6], 0.0), visit, add);
         let body = |((gram, sites), [x, y, z, inverse]): (&(Mat6, f64), &[f64; 4])| Body {
             center: [*x, *y, *z],
             radius: inverse.recip(),
             basis: rigid::orthonormalise(gram, *sites),
         };
-        grams.par_iter().zip(&self.frames).map(body).collect()
+        grams.par_iter().zip(frames).map(body).collect()
     }
 
     /// Forces on plain motions to forces on orthonormal ones.
@@ -113,7 +140,8 @@ impl<'a, O: Coarsen> Fine<'a, O> {
 
     /// Bytes in addition to the operator's.
     pub fn bytes(&self) -> usize {
-        self.diagonal.bytes() + self.aggregates.bytes() + self.frames.len() * (32 + 144)
+        let Grouped { aggregates, frames } = &*self.grouped;
+        self.diagonal.bytes() + aggregates.bytes() + frames.len() * (32 + 144)
     }
 }
 
@@ -255,7 +283,7 @@ fn frames(operator: &impl Coarsen, aggregates: &Aggregates) -> Vec<[f64; 4]> {
     frames
 }
 
-impl<O: Coarsen> Level<3> for Fine<'_, O> {
+impl<O: Coarsen> Level<3> for Fine<O> {
     fn sites(&self) -> usize {
         self.diagonal.sites()
     }
@@ -296,17 +324,18 @@ impl<O: Coarsen> Level<3> for Fine<'_, O> {
     }
 
     fn aggregates(&self) -> &Aggregates {
-        &self.aggregates
+        &self.grouped.aggregates
     }
 
     #[inline]
     fn each_modes(&self, sites: Range<usize>, mut visit: impl FnMut(usize, Modes<3>)) {
-        each_position(self.operator, sites, |site, x| {
-            let aggregate = self.aggregates.of(site);
+        let Grouped { aggregates, frames } = &*self.grouped;
+        each_position(&self.operator, sites, |site, x| {
+            let aggregate = aggregates.of(site);
             if aggregate == NONE {
                 return visit(site, [[0.0; 8]; 3]);
             }
-            let frame = &self.frames[aggregate as usize];
+            let frame = &frames[aggregate as usize];
             let [x, y, z] = [0, 1, 2].map(|c| ((x[c] - frame[c]) * frame[3]) as f32);
             let f = self.diagonal.free(site);
             let modes = [

@@ -11,10 +11,11 @@ use super::level::Level;
 use super::rigid::{self, Mat6};
 use super::window::{BLOCK, Rows, Wide, Window};
 use rayon::prelude::*;
+use std::borrow::Borrow;
 use std::ops::Range;
 
-/// Blocks of a part of the coarse matrix, upper triangle (column >= row).
-struct Part {
+/// Blocks of a part of the coarse matrix, upper triangle (column >= row), in the plain motions of [`Level::each_modes`].
+pub struct Part {
     places: Vec<(u32, u32)>,
     blocks: Vec<Block6>,
 }
@@ -25,12 +26,40 @@ pub fn product<const D: usize>(
     omega: f32,
     bodies: Option<&[Body]>,
 ) -> BlockMatrix {
+    merge(parts(level, omega, &All), bodies)
+}
+
+/// What sites add to `PᵀAP`, part by part.
+pub fn parts<const D: usize>(level: &impl Level<D>, omega: f32, of: &impl Which) -> Vec<Part> {
     let per = level.sites().div_ceil(PARTS).max(2 * BLOCK);
-    let parts: Vec<Part> = (0..level.sites().div_ceil(per))
+    let sites = |c: usize| c * per..((c + 1) * per).min(level.sites());
+    (0..level.sites().div_ceil(per))
         .into_par_iter()
-        .map(|c| part(level, omega, c * per..((c + 1) * per).min(level.sites())))
-        .collect();
-    merge(parts, bodies)
+        .map(|c| part(level, omega, of, sites(c)))
+        .collect()
+}
+
+/// The sites that a product is summed over.
+pub trait Which: Sync {
+    /// Whether a site is one of them.
+    fn is_summed(&self, site: usize) -> bool;
+    /// Whether a site is one of them or a neighbour of one.
+    fn is_next(&self, site: usize) -> bool;
+}
+
+/// All of them.
+struct All;
+
+impl Which for All {
+    #[inline(always)]
+    fn is_summed(&self, _: usize) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn is_next(&self, _: usize) -> bool {
+        true
+    }
 }
 
 /// Parts of the sites: enough for many threads, few enough that little is made twice at their borders.
@@ -47,7 +76,12 @@ fn in_basis(block: &Block6, row: &Body, column: &Body) -> Block6 {
     })
 }
 
-fn part<const D: usize>(level: &impl Level<D>, omega: f32, sites: Range<usize>) -> Part {
+fn part<const D: usize>(
+    level: &impl Level<D>,
+    omega: f32,
+    of: &impl Which,
+    sites: Range<usize>,
+) -> Part {
     let spans = sites.clone().step_by(BLOCK);
     let spans: Vec<Range<usize>> = spans.map(|s| s..(s + BLOCK).min(sites.end)).collect();
     // What a span of sites reaches, with everything that later ones reach: the sweep never turns back.
@@ -60,9 +94,12 @@ fn part<const D: usize>(level: &impl Level<D>, omega: f32, sites: Range<usize>) 
     let mut image = Image::new(level.aggregates().count);
     let mut sum = Sum::new(level.aggregates().count);
     for (span, reach) in spans.into_iter().zip(reaches) {
-        prolongator.cover(reach);
+        prolongator.cover(reach, of);
         let rows = prolongator.rows();
         level.each_row(span, &mut |site, columns, blocks| {
+            if !of.is_summed(site) {
+                return;
+            }
             let (aggregates, entries) = rows.row(site);
             // Blocks left of the diagonal are not kept.
             let Some(&least) = aggregates.iter().min() else {
@@ -112,8 +149,8 @@ impl<'l, const D: usize, L: Level<D>> Prolongator<'l, L, D> {
         &self.rows
     }
 
-    /// Makes the rows of `sites`; earlier ones are dropped.
-    fn cover(&mut self, sites: Range<usize>) {
+    /// Makes the rows of `sites`, those that the sum needs; earlier ones are dropped.
+    fn cover(&mut self, sites: Range<usize>, of: &impl Which) {
         let n = self.level.sites();
         let span = |b: usize| b * BLOCK..((b + 1) * BLOCK).min(n);
         let blocks = |r: Range<usize>| r.start / BLOCK..r.end.div_ceil(BLOCK);
@@ -126,7 +163,7 @@ impl<'l, const D: usize, L: Level<D>> Prolongator<'l, L, D> {
             let image = &mut self.image;
             level.each_row(span(b), &mut |site, columns, blocks| {
                 let (home, own) = modes.row(site);
-                if let ([home], [own]) = (home, own) {
+                if let ([home], [own], true) = (home, own, of.is_next(site)) {
                     gather.image(image, columns, blocks, modes, 0);
                     gather.smooth(image, omega, &level.inverse(site), *home, own);
                     rows.extend(image.aggregates(), image.blocks());
@@ -202,11 +239,11 @@ impl Sum {
 }
 
 /// Adds up the parts in their order, changes the basis and makes the diagonal blocks even.
-fn merge(parts: Vec<Part>, bodies: Option<&[Body]>) -> BlockMatrix {
+pub fn merge<P: Borrow<Part> + Sync>(parts: Vec<P>, bodies: Option<&[Body]>) -> BlockMatrix {
     let mut index: Vec<(u32, u32, u32, u32)> =
-        Vec::with_capacity(parts.iter().map(|p| p.places.len()).sum());
+        Vec::with_capacity(parts.iter().map(|p| p.borrow().places.len()).sum());
     for (p, part) in parts.iter().enumerate() {
-        let places = part.places.iter().enumerate();
+        let places = part.borrow().places.iter().enumerate();
         index.extend(places.map(|(k, &(row, column))| (row, column, p as u32, k as u32)));
     }
     index.par_sort_unstable();
@@ -216,7 +253,7 @@ fn merge(parts: Vec<Part>, bodies: Option<&[Body]>) -> BlockMatrix {
     let block = |at: &&[(u32, u32, u32, u32)]| {
         let mut sum = [0f32; 36];
         for &(_, _, p, k) in *at {
-            let part = &parts[p as usize].blocks[k as usize];
+            let part = &parts[p as usize].borrow().blocks[k as usize];
             sum.iter_mut().zip(part).for_each(|(s, p)| *s += p);
         }
         finished(sum, at[0].0, at[0].1, bodies)

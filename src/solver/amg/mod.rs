@@ -22,16 +22,18 @@ mod grouping;
 mod image;
 mod level;
 mod rigid;
+pub mod supports;
 mod window;
 
 use crate::operator::SinglePreconditioner;
 use crate::operator::coarsen::Coarsen;
 use crate::operator::held::Held;
+use blocks::BlockMatrix;
 use chebyshev::Chebyshev;
 use coarse::{Coarse, mean_site_stiffness};
 use coarsest::Coarsest;
 use cycle::{Below, Smoothing, Vectors, accelerated, cycle, one_cycle};
-use fine::Fine;
+use fine::{Body, Fine};
 use level::{Level, Six};
 use std::sync::Mutex;
 
@@ -84,8 +86,8 @@ struct Assembled {
 }
 
 /// `z ≈ A⁻¹ r` by one symmetric cycle. Its coarse problems are solved by one cycle each, or by several in a polynomial.
-pub struct Amg<'a, O> {
-    fine: Fine<'a, O>,
+pub struct Amg<O> {
+    fine: Fine<O>,
     how: Smoothing,
     coarse: Vec<Assembled>,
     coarsest: Coarsest,
@@ -93,11 +95,22 @@ pub struct Amg<'a, O> {
     room: Mutex<Vec<Vectors>>,
 }
 
-impl<'a, O: Coarsen> Amg<'a, O> {
-    pub fn new(operator: &'a O, held: &Held, params: &AmgParams) -> Self {
-        let (fine, mut bodies) = Fine::new(operator, held, params.box_mm);
+impl<O: Coarsen> Amg<O> {
+    pub fn new(operator: O, held: &Held, params: &AmgParams) -> Self {
+        let (fine, bodies) = Fine::new(operator, held, params.box_mm);
         let how = smoothing(&fine, params.degrees[0]);
-        let mut matrix = galerkin::product(&fine, how.omega, Some(&bodies));
+        let matrix = galerkin::product(&fine, how.omega, Some(&bodies));
+        Amg::of(fine, bodies, how, matrix, params)
+    }
+
+    /// From the finest level and the matrix of the one below.
+    fn of(
+        fine: Fine<O>,
+        mut bodies: Vec<Body>,
+        how: Smoothing,
+        mut matrix: BlockMatrix,
+        params: &AmgParams,
+    ) -> Self {
         let mut below = mean_site_stiffness(&fine);
         let mut coarse: Vec<Assembled> = Vec::new();
         while matrix.rows() > params.coarsest {
@@ -175,7 +188,7 @@ impl<'a, O: Coarsen> Amg<'a, O> {
 
 /// The problem of an assembled level, with room for it and for those below.
 struct Problem<'a, O> {
-    amg: &'a Amg<'a, O>,
+    amg: &'a Amg<O>,
     depth: usize,
     rooms: &'a mut [Vectors],
 }
@@ -241,7 +254,7 @@ fn smoothing<const D: usize>(level: &impl Level<D>, degree: usize) -> Smoothing 
     }
 }
 
-impl<O: Coarsen> SinglePreconditioner<3> for Amg<'_, O> {
+impl<O: Coarsen> SinglePreconditioner<3> for Amg<O> {
     fn apply_single(&self, r: &[[f32; 3]], z: &mut Vec<[f32; 3]>, spare: &mut Vec<[f32; 3]>) {
         let mut room = self.room.lock().unwrap_or_else(|e| e.into_inner());
         if self.fine.aggregates().count == 0 {

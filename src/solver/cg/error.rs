@@ -12,8 +12,15 @@
 /// (Lanczos), so `θ_k` alone would promise too much where it still falls. It is taken to fall once more as it has since
 /// two thirds of the iterations, and a motion as soft as `k` iterations can miss is always expected to be there:
 /// `μ = min(θ_k² / θ_{2k/3}, (π / 2k)² θ_1) / 2.25`. The divisor was set on 195 hard bodies (`reports/stability.md`).
+///
+/// What an earlier solve with the same preconditioner came to expect is never exceeded, and with it one iteration is enough for an estimate:
+/// the bound holds after any number of them.
 #[derive(Debug, Clone)]
 pub struct EnergyTail {
+    /// Expected by an earlier solve, before the divisor.
+    known: Option<f64>,
+    /// Expected now, before the divisor.
+    expected: Option<f64>,
     /// The Lanczos matrix: diagonal, and squares of its off-diagonal.
     diagonal: Vec<f64>,
     off_diagonal: Vec<f64>,
@@ -31,6 +38,8 @@ pub struct EnergyTail {
 impl Default for EnergyTail {
     fn default() -> Self {
         EnergyTail {
+            known: None,
+            expected: None,
             diagonal: Vec::new(),
             off_diagonal: Vec::new(),
             smallest: Vec::new(),
@@ -64,6 +73,19 @@ const EACH: usize = 200;
 const RECENT: usize = 3;
 
 impl EnergyTail {
+    /// `known`: what [`EnergyTail::eigenvalue`] was after an earlier solve of about this operator with this preconditioner.
+    pub fn knowing(known: Option<f64>) -> Self {
+        EnergyTail {
+            known: known.filter(|v| *v > 0.0),
+            ..EnergyTail::default()
+        }
+    }
+
+    /// The smallest eigenvalue of the preconditioned operator that is to be expected, by all iterations so far, before the divisor.
+    pub fn eigenvalue(&self) -> Option<f64> {
+        self.expected
+    }
+
     /// Records an iteration: its step `α` and `rᵀz` before it.
     pub fn push(&mut self, alpha: f64, rz: f64) {
         let (alpha_before, rz_before) = self.last;
@@ -104,13 +126,23 @@ impl EnergyTail {
             return None;
         }
         self.phi /= self.phi + rz / self.last.1;
-        if k >= LEAST_ITERATIONS {
-            let now = self.smallest[k - 1];
-            let before = self.smallest[(2 * k / 3).max(1) - 1];
-            let smallest = (now * now / before).min(unseen(k) * self.diagonal[0]);
+        self.expected = self.smallest_expected(k);
+        if let Some(smallest) = self.expected {
             self.estimate = Some(SAFETY * rz * self.phi / smallest);
         }
         self.estimate
+    }
+
+    /// The smallest eigenvalue to be expected after `k` iterations; None where too little is known.
+    fn smallest_expected(&self, k: usize) -> Option<f64> {
+        let now = self.smallest[k - 1];
+        let before = self.smallest[(2 * k / 3).max(1) - 1];
+        let seen = now * now / before;
+        let own = (k >= LEAST_ITERATIONS).then(|| seen.min(unseen(k) * self.diagonal[0]));
+        match (own, self.known) {
+            (own, None) => own,
+            (own, Some(known)) => Some(known.min(own.unwrap_or(seen))),
+        }
     }
 
     /// The last estimate made.
@@ -119,16 +151,21 @@ impl EnergyTail {
     }
 
     /// Estimated error of the functional: the energy norm of the error times the most that a unit of it has lately
-    /// changed the functional by.
+    /// changed the functional by. None while too few changes are known.
     pub fn goal_estimate(&self) -> Option<f64> {
+        if self.diagonal.len() < RECENT {
+            return None;
+        }
         let most = self.sensitivity.into_iter().fold(0.0, f64::max);
         Some((most * self.estimate?).sqrt())
     }
 
     /// The larger of the relative errors of the energy and of the functional, should there be one of that value.
     pub fn with_goal(&self, of_energy: Option<f64>, goal_value: Option<f64>) -> Option<f64> {
-        let of_goal = goal_value.and_then(|value| Some(self.goal_estimate()? / value.abs()));
-        of_energy.map(|e| of_goal.map_or(e, |g| e.max(g)))
+        match goal_value {
+            None => of_energy,
+            Some(value) => Some(of_energy?.max(self.goal_estimate()? / value.abs())),
+        }
     }
 
     /// By bisection, a thousandth exact, from a bound above it.
@@ -217,6 +254,31 @@ mod tests {
         };
         let exact = 2.0 - 2.0 * (std::f64::consts::PI / (n + 1) as f64).cos();
         assert!((tail.smallest_eigenvalue(2.0) / exact - 1.0).abs() < 2e-3);
+    }
+
+    /// What another solve found lets the first iterations be judged, and is never exceeded.
+    #[test]
+    fn a_known_eigenvalue_bounds_the_error_from_the_first_iteration() {
+        let eigenvalues: Vec<f64> = (0..200).map(|k| 0.1 + 0.9 * f64::from(k) / 199.0).collect();
+        let r = vec![1.0; 200];
+        let rz = 200.0;
+        let error: f64 = eigenvalues.iter().map(|a| 1.0 / a).sum();
+        // One iteration along the residual.
+        let alpha = rz / eigenvalues.iter().sum::<f64>();
+        let left: Vec<f64> = eigenvalues
+            .iter()
+            .zip(&r)
+            .map(|(a, r)| r - alpha * a)
+            .collect();
+        let next: f64 = left.iter().map(|v| v * v).sum();
+        let mut tail = EnergyTail::knowing(Some(0.1));
+        tail.push(alpha, rz);
+        let stated = tail.update(next).unwrap();
+        assert!(stated >= error - alpha * rz, "{stated}");
+        assert_eq!(tail.eigenvalue(), Some(0.1));
+        let mut tail = EnergyTail::default();
+        tail.push(alpha, rz);
+        assert_eq!((tail.update(next), tail.eigenvalue()), (None, None));
     }
 
     /// A functional along the error itself: its error is `√(J-part)` of the energy's.

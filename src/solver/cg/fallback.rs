@@ -73,12 +73,17 @@ pub fn minimise_or_fall_back<'a, F: Functional<3>>(
     });
     let left = CgParams {
         trusted_residual: TRUSTED_RESIDUAL / info.residual,
+        known_eigenvalue: None,
         ..left_of(&params, Some(&info))
     };
     let last = cg::minimise(operator, outside, &diagonal, u, &left, goal, |step| {
         observe(after(Some(&info), step));
     });
-    joined(Some(info), last)
+    // What is known of the diagonal tells nothing of the preconditioner.
+    CgInfo {
+        eigenvalue: None,
+        ..joined(Some(info), last)
+    }
 }
 
 /// Largest over smallest entry of the diagonal that is free and not zero.

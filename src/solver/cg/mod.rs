@@ -27,6 +27,9 @@ pub struct CgParams {
     pub max_iterations: usize,
     /// Energy `uᵀAu` that a mechanism's is compared with; the start's where there is none.
     pub reference_energy: Option<f64>,
+    /// [`CgInfo::eigenvalue`] of an earlier solve with the same preconditioner, of the same operator, or times the least factor by which an
+    /// element's stiffness has fallen since. With it a good start needs no five iterations before it is trusted.
+    pub known_eigenvalue: Option<f64>,
 }
 
 impl Default for CgParams {
@@ -37,6 +40,7 @@ impl Default for CgParams {
             trusted_residual: f64::INFINITY,
             max_iterations: 200_000,
             reference_energy: None,
+            known_eigenvalue: None,
         }
     }
 }
@@ -92,6 +96,9 @@ pub struct CgInfo {
     pub energy_error: f64,
     /// Estimated error of the goal, where there is one.
     pub goal_error: Option<f64>,
+    /// The smallest eigenvalue of the preconditioned operator that was expected at the end: what a later solve may start from
+    /// ([`CgParams::known_eigenvalue`]). None where the preconditioner broke down or nothing is known.
+    pub eigenvalue: Option<f64>,
 }
 
 /// The goal of a solve of which nothing but the energy is wanted.
@@ -165,7 +172,7 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
     // Of forces; what is minimised is the elastic energy less twice that work.
     let mut work = start.work;
     let whole = params.reference_energy.unwrap_or(start.energy);
-    let mut tail = EnergyTail::default();
+    let mut tail = EnergyTail::knowing(params.known_eigenvalue);
     let mut goal_value = goal.map(|goal| goal.of(u));
     // The energy when it was last made from the displacements, and what the iterations had gained by then.
     let mut anchor = (start.energy, 0.0);
@@ -251,6 +258,10 @@ fn iterate<V: Vectors<D>, F: Functional<D>, const D: usize>(
         start_energy: start.energy + 2.0 * start.work,
         energy_error: energy_error(ended, &tail, energy, start.norm),
         goal_error: goal_value.map(|value| goal_error(ended, &tail, value, start.norm)),
+        eigenvalue: match ended {
+            Ended::Breakdown | Ended::Mechanism => None,
+            _ => tail.eigenvalue().or(params.known_eigenvalue),
+        },
     }
 }
 

@@ -72,7 +72,7 @@ impl Precondition for ThinOrPlump<'_> {
 }
 
 enum Chosen<'a> {
-    Multigrid(Box<Amg<'a, Springs<'a>>>),
+    Multigrid(Box<Amg<&'a Springs<'a>>>),
     Factor(Box<NetworkFactor>),
 }
 

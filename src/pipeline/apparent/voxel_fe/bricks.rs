@@ -252,6 +252,13 @@ impl Coarsen for Bricks {
         }
     }
 
+    fn is_uniform(&self) -> bool {
+        match self {
+            Bricks::Homogeneous(model) => model.is_uniform(),
+            Bricks::Heterogeneous(model) => model.is_uniform(),
+        }
+    }
+
     fn chunk(&self) -> usize {
         match self {
             Bricks::Homogeneous(model) => model.chunk(),

@@ -3,6 +3,7 @@
 pub mod bricks;
 pub mod cost;
 pub mod failure;
+mod family;
 mod labels;
 pub mod nodes;
 pub mod plastic;
@@ -17,6 +18,7 @@ use crate::discretisation::voxels::Planes;
 use crate::error::Result;
 use crate::mask::resample;
 use crate::measure::apparent::EndWork;
+use crate::operator::held::Held;
 use crate::operator::{Functional, MixedPrecision};
 use crate::par::sum_chunks;
 use crate::pipeline::apparent::discretisation::precondition::Precondition;
@@ -31,21 +33,27 @@ use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::ends::supports::{self, Nodes};
 use crate::pipeline::apparent::ends::uneven::Uneven;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
-use crate::pipeline::apparent::params::{Load, SolveParams};
+use crate::pipeline::apparent::params::{Conditions, Load, SolveParams};
 use crate::pipeline::apparent::resolution;
 use crate::pipeline::apparent::solved::Moduli;
+use crate::pipeline::apparent::stiffness::groups;
 use crate::pipeline::apparent::voxel_fe::bricks::{Bricks, Keep};
+use crate::pipeline::apparent::voxel_fe::family::Family;
 use crate::pipeline::apparent::voxel_fe::labels::Labels;
 use crate::pipeline::apparent::voxel_fe::nodes::{Gripped, along, grid_places};
 use crate::pipeline::apparent::voxel_fe::record::Recorder;
-use crate::result::settings::{CellType, Method, Settings};
+use crate::result::settings::{CellType, Method, Motion, Settings};
 use crate::solver::amg::AmgParams;
 use crate::solver::cg::NoGoal;
 use crate::volume::Specimen;
+use std::sync::Arc;
 
 /// Voxel elements between grips, or joined to the faces where unit strains are the load.
 pub struct VoxelModel {
-    bricks: Bricks,
+    bricks: Arc<Bricks>,
+    family: Family,
+    /// What shaped the elements: the settings without the load.
+    shaped_by: SolveParams,
     grips: Planes,
     motion: EndMotion,
     /// Values of a labelled scan, by voxel.
@@ -65,6 +73,11 @@ impl VoxelModel {
     /// # Errors
     /// Grips that meet.
     pub fn of(bricks: Bricks, specimen: &Specimen, params: &SolveParams) -> Result<Self> {
+        VoxelModel::in_family(Family::alone(Arc::new(bricks)), specimen, params)
+    }
+
+    fn in_family(family: Family, specimen: &Specimen, params: &SolveParams) -> Result<Self> {
+        let bricks = Arc::clone(family.bricks());
         let grip_mm = match params.load.motion() {
             None => 0.0,
             Some(_) => params.grip_mm,
@@ -74,6 +87,8 @@ impl VoxelModel {
         let gauge_mm = (grips.high - grips.low) as f64 * grid.spacing_mm[params.axis.index()];
         Ok(VoxelModel {
             bricks,
+            family,
+            shaped_by: family::shaping(params),
             grips,
             motion: EndMotion::of(specimen, params, gauge_mm),
             labels: Labels::of(specimen, params)?,
@@ -108,6 +123,30 @@ impl VoxelModel {
         model.by_label = Some(ByLabel::of(model.bricks.mesh(), &map, params)?);
         model.resolved = resolved;
         Ok(model)
+    }
+
+    /// The model between plane ends, or with faces.
+    fn between_planes(prepared: Prepared, params: &SolveParams) -> Result<Self> {
+        let keep = Keep::under(params.load);
+        let Some(resolved) = resolution::resolved(prepared.specimen, params)? else {
+            let bricks = Bricks::new(prepared, params, keep)?;
+            return VoxelModel::of(bricks, prepared.specimen, params);
+        };
+        let own = resolution::one_element_a_voxel(params);
+        let specimen = &resolved;
+        let bricks = Bricks::new(
+            Prepared {
+                specimen,
+                ..prepared
+            },
+            &own,
+            keep,
+        )?;
+        let model = VoxelModel::of(bricks, specimen, &own)?;
+        Ok(VoxelModel {
+            resolved: Some(resolved),
+            ..model
+        })
     }
 
     /// The model between ends that are gripped where bone is seen from the end planes.
@@ -148,6 +187,11 @@ impl VoxelModel {
             cycles: 2,
             ..AmgParams::new(self.bricks.mesh().grid.spacing_mm)
         }
+    }
+
+    /// What a unit strain holds.
+    fn faces_held(&self, load: usize) -> Held {
+        supports::held_faces(&self.gripped(), self.params.conditions, load)
     }
 
     fn gripped(&self) -> Gripped<'_> {
@@ -205,32 +249,50 @@ impl Discretisation for VoxelModel {
     }
 
     fn build(_: &(), prepared: Prepared, params: &SolveParams) -> Result<Self> {
-        if params.load == Load::Labels {
-            return VoxelModel::on_labels(prepared, params);
+        let mut model = match params.load {
+            Load::Labels => VoxelModel::on_labels(prepared, params),
+            _ if params.ends_depth_mm > 0.0 => VoxelModel::between_uneven_ends(prepared, params),
+            _ => VoxelModel::between_planes(prepared, params),
+        }?;
+        model.shaped_by = family::shaping(params);
+        if params.load == Load::Stiffness && params.conditions != Conditions::Kinematic {
+            let supports = groups(params.conditions).iter();
+            let supports = supports.map(|loads| model.faces_held(loads[0])).collect();
+            model.family.expect(supports);
         }
-        if params.ends_depth_mm > 0.0 {
-            return VoxelModel::between_uneven_ends(prepared, params);
+        if params.plasticity.is_some() {
+            // Load steps follow the elastic solution.
+            model.keep();
         }
-        let keep = Keep::under(params.load);
-        let Some(resolved) = resolution::resolved(prepared.specimen, params)? else {
-            let bricks = Bricks::new(prepared, params, keep)?;
-            return VoxelModel::of(bricks, prepared.specimen, params);
+        Ok(model)
+    }
+
+    fn keep(&mut self) {
+        self.family.keep();
+    }
+
+    fn under(self, prepared: Prepared, params: &SolveParams) -> Result<Option<Self>> {
+        let between_ends = |load: Load| {
+            load.motion()
+                .is_some_and(|motion| motion != Motion::ByLabel)
         };
-        let own = resolution::one_element_a_voxel(params);
-        let specimen = &resolved;
-        let bricks = Bricks::new(
-            Prepared {
-                specimen,
-                ..prepared
-            },
-            &own,
-            keep,
-        )?;
-        let model = VoxelModel::of(bricks, specimen, &own)?;
-        Ok(VoxelModel {
-            resolved: Some(resolved),
+        let same = between_ends(self.params.load)
+            && between_ends(params.load)
+            && self.shaped_by == family::shaping(params);
+        if !same {
+            return Ok(None);
+        }
+        let (own, specimen) = match &self.resolved {
+            Some(resolved) => (resolution::one_element_a_voxel(params), resolved),
+            None => (params.clone(), prepared.specimen),
+        };
+        let model = VoxelModel::in_family(self.family, specimen, &own)?;
+        Ok(Some(VoxelModel {
+            shaped_by: self.shaped_by,
+            uneven: self.uneven,
+            resolved: self.resolved,
             ..model
-        })
+        }))
     }
 
     fn system(
@@ -239,16 +301,14 @@ impl Discretisation for VoxelModel {
     ) -> System<'_, impl MixedPrecision, impl Precondition, impl Functional<3>> {
         let (mesh, nodes, motion) = (self.bricks.mesh(), self.gripped(), &self.motion);
         System {
-            operator: &self.bricks,
-            coarsen: &self.bricks,
+            operator: &*self.bricks,
+            coarsen: &self.family,
             multigrid: self.multigrid(),
             goal: None::<NoGoal>,
             held: match (loads, &self.by_label) {
                 (LoadSet::Ends, Some(labels)) => labels.hold(nodes.padding()),
                 (LoadSet::Ends, None) => supports::held(&nodes, motion, self.params.load),
-                (LoadSet::UnitStrains(numbers), _) => {
-                    supports::held_faces(&nodes, self.params.conditions, numbers[0])
-                }
+                (LoadSet::UnitStrains(numbers), _) => self.faces_held(numbers[0]),
             },
             start: Box::new(move |load| match (loads, &self.by_label) {
                 (LoadSet::Ends, Some(labels)) => labels.start(),

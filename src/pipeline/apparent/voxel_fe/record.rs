@@ -188,7 +188,7 @@ impl<'a> Recorder<'a> {
             energy_density_mpa: f64::from(density),
             free_faces: free_faces(element),
         }))?;
-        let of_flips = match self.model.bricks {
+        let of_flips = match *self.model.bricks {
             // New nodes on uneven ends would have to move with them.
             Bricks::Homogeneous(_) if self.params.ends_depth_mm > 0.0 => None,
             Bricks::Homogeneous(_) => self.flipped(mean_mpa),

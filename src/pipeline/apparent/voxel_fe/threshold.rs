@@ -34,9 +34,14 @@ pub fn sensitivity(solved: &Solved, specimen: &Specimen, grips: Planes, mean: f6
             let moves = |e: &usize| values[*e] < threshold.lower;
             let is_inside = |e: &usize| voi.is_none_or(|voi| voi.as_slice()[*e] != 0);
             shell.pores.retain(|e| moves(e) && is_inside(e));
+            let of = |voxels: &[usize]| voxels.iter().map(|e| values[*e]).collect();
+            let values = [of(&shell.bone), of(&shell.pores)];
             shell.keep_nearest(values);
         }
-        None => shell.keep_nearest(&smoothed(grid, &shell.filled)),
+        None => {
+            let values = smoothed(grid, &shell.filled, [&shell.bone, &shell.pores]);
+            shell.keep_nearest(values);
+        }
     }
     let change = |e: &usize| solved.change(at(grid, *e).map(|v| v as i64));
     let mean_of = |voxels: &[usize]| {
@@ -54,6 +59,7 @@ struct Shell {
     grid: Grid,
     filled: Vec<bool>,
     elements: usize,
+    /// Rising, as `pores` are.
     bone: Vec<usize>,
     pores: Vec<usize>,
 }
@@ -63,11 +69,11 @@ impl Shell {
     fn of(mesh: &VoxelMesh, grips: Planes) -> Shell {
         let grid = mesh.grid;
         let mut filled = vec![false; grid.len()];
-        let elements: Vec<usize> = mesh.low_corner_elements().flatten().collect();
-        elements.iter().for_each(|e| filled[*e] = true);
+        let elements = || mesh.low_corner_elements().flatten();
+        elements().for_each(|e| filled[e] = true);
         let mut is_pore = vec![false; grid.len()];
         let mut bone = Vec::new();
-        for &e in &elements {
+        for e in elements() {
             let mut is_free = false;
             each_beside(grid, e, |other| {
                 is_free |= !filled[other];
@@ -77,6 +83,7 @@ impl Shell {
                 bone.push(e);
             }
         }
+        bone.sort_unstable();
         let axis = grips.axis.index();
         let is_between = |e: &usize| {
             let z = at(grid, *e)[axis];
@@ -85,25 +92,36 @@ impl Shell {
         let pores = (0..grid.len()).filter(|e| is_pore[*e]).filter(is_between);
         Shell {
             grid,
-            elements: elements.len(),
+            elements: mesh.elements,
             bone,
             pores: pores.collect(),
             filled,
         }
     }
 
-    /// Leaves [`MOVED`] of the volume: bone of the smallest values, pores of the largest.
-    fn keep_nearest(&mut self, values: &[f32]) {
+    /// Leaves [`MOVED`] of the volume: bone of the smallest values, pores of the largest. `of_bone` and `of_pores` are theirs.
+    fn keep_nearest(&mut self, [of_bone, of_pores]: [Vec<f32>; 2]) {
         let moved = ((MOVED * self.elements as f64) as usize).max(1);
-        let rising = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]).then(a.cmp(b));
         let (grid, filled) = (self.grid, &self.filled);
-        keep_first(&mut self.bone, moved, rising, |_| true);
+        let rising =
+            |values: &[f32], a: usize, b: usize| values[a].total_cmp(&values[b]).then(a.cmp(&b));
+        let mut places: Vec<usize> = (0..self.bone.len()).collect();
         keep_first(
-            &mut self.pores,
+            &mut places,
             moved,
-            |a, b| rising(b, a),
-            |e| !joins(grid, filled, e),
+            |a, b| rising(&of_bone, *a, *b),
+            |_| true,
         );
+        self.bone = places.iter().map(|place| self.bone[*place]).collect();
+        places = (0..self.pores.len()).collect();
+        let pores = &self.pores;
+        keep_first(
+            &mut places,
+            moved,
+            |a, b| rising(&of_pores, *b, *a),
+            |place| !joins(grid, filled, pores[place]),
+        );
+        self.pores = places.iter().map(|place| self.pores[*place]).collect();
     }
 }
 
@@ -146,11 +164,27 @@ fn each_beside(grid: Grid, e: usize, mut visit: impl FnMut(usize)) {
     }
 }
 
-/// The mask, smoothed: a guess of how near to the surface its voxels are.
-fn smoothed(grid: Grid, filled: &[bool]) -> Vec<f32> {
+/// The mask at some voxels, smoothed: a guess of how near to the surface they are. Their indices rise.
+fn smoothed(grid: Grid, filled: &[bool], at: [&[usize]; 2]) -> [Vec<f32>; 2] {
     let sharp = filled.iter().map(|f| f32::from(u8::from(*f))).collect();
     let sharp = Volume::from_vec(grid, sharp);
-    gaussian::map_slabs(&sharp, SMOOTHED, |v| v, |_, part| part.to_vec()).concat()
+    let plane = grid.n[0] * grid.n[1];
+    let slabs = gaussian::map_slabs(
+        &sharp,
+        SMOOTHED,
+        |v| v,
+        |slices, part| {
+            let (first, end) = (slices.start * plane, slices.end * plane);
+            at.map(|voxels| {
+                let [from, to] = [first, end].map(|e| voxels.partition_point(|v| *v < e));
+                voxels[from..to]
+                    .iter()
+                    .map(|e| part[e - first])
+                    .collect::<Vec<f32>>()
+            })
+        },
+    );
+    [0, 1].map(|k| slabs.iter().flat_map(|slab| &slab[k]).copied().collect())
 }
 
 /// Whether bone around a pore is in parts that only the pore would join: voxels of 3 × 3 × 3 that share faces.

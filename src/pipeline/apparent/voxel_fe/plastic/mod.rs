@@ -15,7 +15,6 @@ use crate::pipeline::apparent::params::{LoadSteps, SolveParams};
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::VoxelModel;
 use crate::result::strength::OFFSET;
-use crate::solver::amg::Amg;
 use crate::solver::load_step::StepParams;
 
 /// Squared energy norm of the error left in a step, over its work and the tolerance of the solve: with it energies balance to 1e-6.
@@ -48,7 +47,7 @@ impl VoxelModel {
         };
         let points = Points::new(mesh.grid.spacing_mm, true);
         let strain = self.motion.loaded.displacement_mm / self.motion.loaded.gauge_mm;
-        let preconditioner = Amg::new(&self.bricks, held, &self.multigrid());
+        let preconditioner = self.family.multigrid(held, &self.multigrid());
         let loading = Loading {
             held,
             elastic,
@@ -60,7 +59,7 @@ impl VoxelModel {
             .filter(|h| h.u.len() == mesh.len())
             .unwrap_or_else(fresh);
         let mut failed = None;
-        let body = PlasticBricks::new(&self.bricks, mesh, points, of_node);
+        let body = PlasticBricks::new(&*self.bricks, mesh, points, of_node);
         let outcome = load(
             body,
             &loading,

@@ -27,7 +27,7 @@ impl VoxelModel {
         let mesh = self.bricks.mesh();
         let points = Points::new(mesh.grid.spacing_mm, true);
         let mut force = vec![[0.0; 3]; mesh.len()];
-        let mut body = PlasticBricks::new(&self.bricks, mesh, points, tissue)
+        let mut body = PlasticBricks::new(&*self.bricks, mesh, points, tissue)
             .with_states(history.states.clone());
         body.forces(&history.u, &mut force);
         let turned = body.share_turned(&history.u, LARGE_TURN);

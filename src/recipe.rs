@@ -111,6 +111,19 @@ impl Recipe {
                 "give a relative error between 0 and 1 (0.03 is 3 %)",
             ));
         }
+        let smooth = [
+            ("element_mm", self.solve.element_mm.is_some()),
+            ("surface", self.solve.surface.is_some()),
+        ];
+        if let Some((key, _)) = smooth.into_iter().find(|(_, is_given)| *is_given)
+            && self.error.is_some()
+        {
+            return Err(Error::setting(
+                format!("solve.{key}"),
+                "the error target chooses voxel elements, which do not have it",
+                format!("leave out {key}, or leave out error"),
+            ));
+        }
         self.segment.check()?;
         self.lattice.check()?;
         self.check_in_vivo()?;

@@ -39,7 +39,7 @@ pub struct SolveArgs {
     /// Choose the resolution so that the stated error (solver, elements, shape) stays below this, as 3% or
     /// 0.03; exit 1 where it cannot be met. With --plasticity the error of the strength (load steps, elements,
     /// solver)
-    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "element_mm", "lp_mm", "boundary", "structure"])]
+    #[arg(long, help_heading = "Solve", value_name = "ERROR", value_parser = words::fraction, conflicts_with_all = ["method", "refine", "refine_mask", "coarsen", "element_mm", "surface", "lp_mm", "boundary", "structure"])]
     error: Option<f64>,
     /// Also write the model for another program: inp (voxel-fe, geometry-fe: CalculiX, Abaqus), stl (geometry-fe: the
     /// surface), vtu (geometry-fe: the mesh, for ParaView)
@@ -200,7 +200,9 @@ impl SolveSettings {
     pub fn apply(&self, params: &mut SolveParams, by_error: bool) -> Result<()> {
         if by_error {
             self.refuse_resolution()?;
-            params.method = Method::VoxelFe;
+            if params.element_mm.is_none() && params.surface.is_none() {
+                params.method = Method::VoxelFe;
+            }
         }
         self.replace_supports(params);
         lay_over(params, self)?;
@@ -242,6 +244,8 @@ impl SolveSettings {
             ("--refine", self.refine.is_some()),
             ("--refine-mask", self.refine_mask.is_some()),
             ("--coarsen", self.coarsen.is_some()),
+            ("--element-mm", self.element_mm.is_some()),
+            ("--surface", self.surface.is_some()),
         ];
         match given.iter().find(|(_, is_given)| *is_given) {
             None => Ok(()),

@@ -36,6 +36,8 @@ pub fn voxel_fe(params: &SolveParams, coarsen: usize, refine: usize) -> SolvePar
         coarsen,
         refine,
         refine_mask: false,
+        element_mm: None,
+        surface: None,
         ..params.clone()
     }
 }

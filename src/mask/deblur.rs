@@ -11,14 +11,15 @@ use rayon::prelude::*;
 /// σ in voxels of the smoothing under which curvatures are taken, so that they do not follow noise.
 const NOISE_FREE: f64 = 0.5;
 
-/// Variance in voxels² of a voxel's box and of the cubics between voxels together; see [`super::upsample::sharpened`].
+/// Variance in voxels² that is added to the blur's: 1/12 for the voxel's box, the rest for what the first order leaves. Set on bars: with it their
+/// cross-section comes out within −0.4 to +2.2 % at radii of 2 to 6 voxels and blurs of 0.35 to 0.86; with 1/12 alone, −0.2 to −4.9 %.
 const VOXEL: f64 = 1.0 / 3.0;
 
 /// Values corrected for a blur of `sigma_voxels`, the voxel's box and its interpolation.
 pub fn deblurred(grey: &Volume<f32>, sigma_voxels: f64) -> Volume<f32> {
     let smooth = gaussian::smoothed(grey, NOISE_FREE);
     let variance = sigma_voxels.powi(2) + VOXEL;
-    // Slopes of the smoothed values are smaller by the root.
+    // Smoothing divides slopes at the surface by √(1 + NOISE_FREE² / variance); this makes up for it.
     let share = 0.5 * variance * (1.0 + NOISE_FREE.powi(2) / variance).sqrt();
     let [nx, ny, nz] = grey.grid.n;
     let mut values = vec![0f32; grey.as_slice().len()];
@@ -36,7 +37,8 @@ pub fn deblurred(grey: &Volume<f32>, sigma_voxels: f64) -> Volume<f32> {
     deblurred
 }
 
-/// `Δg − g_nn` by differences of neighbours, in units of voxels. Beyond the ends of the grid values go on in a straight line.
+/// `Δg − g_nn` by differences of neighbours, in units of voxels. Across the faces of the grid nothing is bent. Where the slope is zero, `n` is the axis along
+/// which values bend most: that of a plate.
 fn curvature_term(values: &[f32], n: [usize; 3], at: [usize; 3]) -> f64 {
     let strides = [1, n[0], n[0] * n[1]];
     let place = at[0] + at[1] * strides[1] + at[2] * strides[2];
@@ -49,11 +51,14 @@ fn curvature_term(values: &[f32], n: [usize; 3], at: [usize; 3]) -> f64 {
         (value(upper) - value(lower)) / steps.max(1) as f64
     });
     let squared: f64 = slope.iter().map(|s| s * s).sum();
-    let (mut sum, mut along) = (0.0, 0.0);
+    let (mut sum, mut along, mut most) = (0.0, 0.0, 0.0f64);
     for a in (0..3).filter(|a| is_inside(*a)) {
         let p = strides[a];
         let second = value(place + p) - 2.0 * value(place) + value(place - p);
         sum += second;
+        if second.abs() > most.abs() {
+            most = second;
+        }
         along += slope[a] * slope[a] * second;
         for b in (a + 1..3).filter(|b| is_inside(*b)) {
             let q = strides[b];
@@ -64,7 +69,7 @@ fn curvature_term(values: &[f32], n: [usize; 3], at: [usize; 3]) -> f64 {
     }
     match squared > 0.0 {
         true => sum - along / squared,
-        false => sum,
+        false => sum - most,
     }
 }
 

@@ -41,8 +41,8 @@ def measure(program, chosen):
             for scan in truth_set.SCANS:
                 folder = segmented(bench, body, scan)
                 thickness = json.loads((folder / "segment.json").read_text())["results"]["mean_thickness_mm"]
-                for name, surface in SURFACES.get(scan, [(scan, "image")]):
-                    bench.call("solve", folder, "--method", "geometry-fe", "--surface", surface)
+                for name, surface in SURFACES.get(scan, [(scan, None)]):
+                    bench.call("solve", folder, "--method", "geometry-fe", *(["--surface", surface] if surface else []))
                     row = rows_of(folder)[-1]
                     values = [row["lp_mm"], row["e_app_mpa"], row["error_mpa"], row["threshold_sensitivity"], thickness, row["wall_s"]]
                     out.writerow([body["name"], half, name, *(f"{number(str(v)):.5g}" for v in values)])

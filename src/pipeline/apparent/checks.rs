@@ -409,8 +409,11 @@ fn check_smooth(params: &SolveParams) -> Result<()> {
     match given.into_iter().find(|(_, is_given)| *is_given) {
         Some((key, _)) if params.method != Method::GeometryFe => Err(Error::setting(
             format!("solve.{key}"),
-            "only geometry-fe has it",
-            "use method geometry-fe, or leave it out",
+            format!(
+                "only geometry-fe has it, and the method is {}",
+                params.method.name()
+            ),
+            "set the method to geometry-fe, or leave it out",
         )),
         _ => Ok(()),
     }

@@ -31,7 +31,7 @@ pub enum CoarsenBy {
 pub enum SurfaceOf {
     /// Where the image crosses its threshold.
     Image,
-    /// The same, corrected for what the image's blur does to it: it thins struts and fills joints.
+    /// The same, corrected for what the image's blur, or the voxel's own box, does to it: it thins struts and fills joints.
     Body,
 }
 
@@ -142,9 +142,13 @@ pub struct SolveParams {
     /// geometry-fe: edge of the cells that elements are made in, in mm. None: from the struts' thickness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub element_mm: Option<f64>,
-    /// geometry-fe: whose surface it is. None: the body's where `segment` was given the scanner's blur, else the image's.
+    /// geometry-fe: whose surface it is. None: the body's where `segment` was given the scanner's blur or none
+    /// is seen, else the image's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceOf>,
+    /// σ in voxels of the blur that the body's surface is corrected for: follows from the scan, so that a solve with another blur is another.
+    #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
+    pub corrected_blur_voxels: Option<f64>,
     /// Also count mechanisms; takes a factorisation.
     pub mechanisms: bool,
     /// Fields to write.
@@ -194,6 +198,7 @@ impl Default for SolveParams {
             coarsen_by: CoarsenBy::default(),
             element_mm: None,
             surface: None,
+            corrected_blur_voxels: None,
             mechanisms: false,
             fields: Vec::new(),
             pistoia: None,

@@ -1,8 +1,10 @@
 //! Owns how much memory and time smooth elements take, from the volume of bone.
 
 use super::size;
+use crate::measure::thickness::plate_thickness_mm;
 use crate::pipeline::apparent::discretisation::{ASSUMED_BONE, Cost, Known, Prepared, Resolution};
 use crate::pipeline::apparent::params::SolveParams;
+use crate::volume::Specimen;
 
 /// Elements per cell inside bone.
 const PER_CELL: f64 = 12.0;
@@ -38,18 +40,18 @@ pub fn of(params: &SolveParams, known: Known) -> Cost {
 
 fn of_bone(params: &SolveParams, Prepared { specimen, .. }: Prepared) -> Cost {
     let size_mm = size::of(specimen, params);
-    let cells = specimen.bv_mm3() / size_mm.powi(3);
-    let thickness = crate::measure::thickness::plate_thickness_mm(&specimen.bone);
-    let at_surface = thickness.map_or(0.0, |t| AT_SURFACE * size_mm / t);
     let volume = specimen.bone.grid.size_mm().iter().product::<f64>();
     let vertices = 2.0 * volume / size_mm.powi(3);
     let voxels = specimen.bone.grid.len() as f64;
-    cost(
-        PER_CELL * cells * (1.0 + at_surface),
-        vertices,
-        voxels,
-        size_mm,
-    )
+    cost(elements(specimen, size_mm), vertices, voxels, size_mm)
+}
+
+/// About how many elements a specimen takes in cells of `size_mm`.
+pub fn elements(specimen: &Specimen, size_mm: f64) -> f64 {
+    let cells = specimen.bv_mm3() / size_mm.powi(3);
+    let thickness = plate_thickness_mm(&specimen.bone);
+    let at_surface = thickness.map_or(0.0, |t| AT_SURFACE * size_mm / t);
+    PER_CELL * cells * (1.0 + at_surface)
 }
 
 fn cost(elements: f64, vertices: f64, voxels: f64, size_mm: f64) -> Cost {

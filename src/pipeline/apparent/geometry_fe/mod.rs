@@ -23,7 +23,7 @@ use crate::pipeline::apparent::ends::motion::EndMotion;
 use crate::pipeline::apparent::ends::reactions::End;
 use crate::pipeline::apparent::ends::supports;
 use crate::pipeline::apparent::fields::{Equilibrated, Recorded};
-use crate::pipeline::apparent::params::{SolveParams, SurfaceOf};
+use crate::pipeline::apparent::params::SolveParams;
 use crate::pipeline::apparent::solved::Moduli;
 use crate::pipeline::apparent::tissue::Tissue;
 use crate::pipeline::apparent::voxel_fe::failure;
@@ -123,13 +123,6 @@ impl Discretisation for GeometryModel {
         size::check(specimen, params)?;
         let grips = Grips::of(specimen, params)?;
         let source = Source::of(specimen, params);
-        if source == Source::Mask && params.surface == Some(SurfaceOf::Body) {
-            return Err(Error::setting(
-                "solve.surface",
-                "a mask has no grey values to correct for blur",
-                "segment the grey scan, or leave the setting out",
-            ));
-        }
         let surface = surface::of(specimen, source);
         let (mesh, report) = mesh::of(specimen, &surface, &grips, params)?;
         let (young_mpa, poisson, factor) = match tissue {

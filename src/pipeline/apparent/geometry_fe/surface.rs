@@ -27,19 +27,31 @@ pub enum Source {
 }
 
 impl Source {
-    /// Of a specimen: the body's surface where it is asked for, or where the scanner's blur was given.
+    /// Of a specimen: the body's surface where it is asked for, where the scanner's blur was given, or where no blur is seen.
     pub fn of(specimen: &Specimen, params: &SolveParams) -> Source {
         let (Some(_), Some(threshold)) = (&specimen.grey, &specimen.threshold) else {
             return Source::Mask;
         };
+        let sigma_voxels = threshold.blur_voxels.unwrap_or(0.0);
+        let is_sharp = sigma_voxels < BLURRED_VOXELS;
         let of_body = match params.surface {
             Some(of) => of == SurfaceOf::Body,
-            None => threshold.is_blur_given,
+            None => threshold.is_blur_given || is_sharp,
         };
-        match threshold.blur_voxels.unwrap_or(0.0) {
-            sharp if sharp < BLURRED_VOXELS => Source::Sharpened,
-            sigma_voxels if of_body => Source::Deblurred { sigma_voxels },
-            _ => Source::Grey,
+        match (of_body, is_sharp) {
+            (true, true) => Source::Sharpened,
+            (true, false) => Source::Deblurred { sigma_voxels },
+            (false, _) => Source::Grey,
+        }
+    }
+
+    /// The settings that say so; None of a mask, whose surface is a guess.
+    pub fn named(self) -> (Option<SurfaceOf>, Option<f64>) {
+        match self {
+            Source::Grey => (Some(SurfaceOf::Image), None),
+            Source::Sharpened => (Some(SurfaceOf::Body), None),
+            Source::Deblurred { sigma_voxels } => (Some(SurfaceOf::Body), Some(sigma_voxels)),
+            Source::Mask => (None, None),
         }
     }
 

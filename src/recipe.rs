@@ -299,6 +299,9 @@ mod tests {
     fn keys_that_are_left_out_by_default_are_known() {
         let recipe = parse("[solve]\nmethod = \"geometry-fe\"\nelement_mm = 0.05").unwrap();
         assert_eq!(recipe.solve.element_mm, Some(0.05));
+        let to_an_error = "error = 0.1\n[solve]\nmethod = \"geometry-fe\"\nsurface = \"body\"";
+        let refused = parse(to_an_error).and_then(|recipe| recipe.check());
+        assert!(refused.is_err_and(|e| e.to_string().contains("solve.surface")));
     }
 
     #[test]
@@ -307,7 +310,10 @@ mod tests {
             let settings = text.parse().unwrap();
             Recipe::default().with(settings, Path::new("the settings"))
         };
-        let recipe = with("lower = 3.0\nlp_mm = [0.1]\npoisson = 0.2\nelement_mm = 0.1").unwrap();
+        let recipe = with(
+            "lower = 3.0\nlp_mm = [0.1]\npoisson = 0.2\nmethod = \"geometry-fe\"\nelement_mm = 0.1",
+        )
+        .unwrap();
         assert_eq!(recipe.segment.lower, Some(3.0));
         assert_eq!(recipe.lattice.lp_mm, [0.1]);
         assert_eq!(

@@ -350,7 +350,8 @@ mod tests {
         assert_eq!(count(Region::Edge(Edge::Top)).unwrap(), 4);
         assert_eq!(count(Region::Box([0.0, 0.0, 2.0, 1.0])).unwrap(), 2);
         assert_eq!(count(Region::Outside([0.5, 0.5, 0.1])).unwrap(), 11);
-        assert_eq!(count(Region::Point([9.0, 9.0])).unwrap(), 1);
+        assert_eq!(count(Region::Point([3.6, 2.4])).unwrap(), 1);
+        assert!(count(Region::Point([9.0, 9.0])).is_err());
         assert!(count(Region::Disc([9.0, 9.0, 1.0])).is_err());
     }
 }

@@ -113,7 +113,7 @@ fn bone_volumes_of_models_are_held_against_the_mask() {
     for row in &mut rows {
         // A mean has no model of its own.
         let firm = row.key.boundary == Some(BoundaryRule::Firm);
-        row.solved.as_mut().unwrap().model_bv_tv = firm.then(|| 1.5 * row.key.bv_tv + 0.01);
+        row.solved.as_mut().unwrap().model_bv_tv = firm.then_some(1.5 * row.key.bv_tv + 0.01);
     }
     let found = of(&rows);
     let lines = found.regressions.iter();

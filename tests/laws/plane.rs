@@ -70,7 +70,8 @@ fn heat_strains_a_free_body_without_stress() {
         ]
     };
     type Place<T> = fn([f64; 2]) -> T;
-    let cases: [([f64; 3], Place<f64>, Place<[f64; 3]>); 2] = [
+    type Case = ([f64; 3], Place<f64>, Place<[f64; 3]>);
+    let cases: [Case; 2] = [
         ([0.3, -0.2, 0.1], uniform, along_axes),
         ([0.4, 0.4, 0.0], linear, alike),
     ];

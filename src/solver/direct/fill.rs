@@ -108,11 +108,11 @@ mod tests {
     fn eliminated(graph: &Graph, order: &[u32]) -> usize {
         let n = order.len();
         let mut joined = vec![vec![false; n]; n];
-        for i in 0..n {
+        for (i, joined) in joined.iter_mut().enumerate() {
             let range = graph.start[i] as usize..graph.start[i + 1] as usize;
             graph.others[range]
                 .iter()
-                .for_each(|&j| joined[i][j as usize] = true);
+                .for_each(|&j| joined[j as usize] = true);
         }
         let (mut left, mut blocks) = (vec![true; n], 0);
         for &site in order {

@@ -507,6 +507,19 @@ fn a_surface_corrected_for_blur_has_the_stiffness_of_the_body() {
     // By the variance over the square of the radius: 8.3 %; the cubics between voxels blur a little more.
     assert!((-0.11..-0.08).contains(&image), "{image}");
     assert!(body.abs() < 0.01, "{body}");
+    // A row is found again by its settings, the blur among them.
+    let open = SolveParams {
+        surface: None,
+        ..params(1.1)
+    };
+    let settings = settled(&bar, &open).unwrap().into_owned();
+    assert_eq!(settings.surface, Some(SurfaceOf::Body));
+    assert_eq!(settings.corrected_blur_voxels, Some(0.9));
+    let written = serde_json::to_string(&settings).unwrap();
+    assert_eq!(
+        serde_json::from_str::<SolveParams>(&written).unwrap(),
+        settings
+    );
     let plate = blurred([12, 8, 8], |p| 13.0 / 6.0 - (p[0] - 35.0 / 6.0).abs());
     let [image, body] = [SurfaceOf::Image, SurfaceOf::Body].map(|s| of(&plate, Some(s)));
     let exact = 1000.0 * 13.0 / 36.0;

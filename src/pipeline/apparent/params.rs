@@ -147,7 +147,7 @@ pub struct SolveParams {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceOf>,
     /// σ in voxels of the blur that the body's surface is corrected for: follows from the scan, so that a solve with another blur is another.
-    #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub corrected_blur_voxels: Option<f64>,
     /// Also count mechanisms; takes a factorisation.
     pub mechanisms: bool,

@@ -252,7 +252,7 @@ const RESULTS: [Column; 66] = [
     column(
         "elements",
         "",
-        "what elements follow from: voxels, interpolated-grey, smoothed-grey, split-voxels, block-means, bone-fractions; of geometry-fe smooth-grey (grey values) or smooth-mask (a guess)",
+        "what elements follow from: voxels, interpolated-grey, smoothed-grey, split-voxels, block-means, bone-fractions; of geometry-fe smooth-grey (grey values), smooth-deblurred (corrected for blur) or smooth-mask (a guess)",
     ),
     column(
         "shape_error_mpa",
